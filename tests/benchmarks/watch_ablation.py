@@ -23,16 +23,8 @@ from typing import Any
 import numpy as np
 
 from shm.values import BaselineCheck
-from shm.watch import (
-    causes,
-    mistaken_modes,
-    options,
-    persistence,
-    readings,
-    state_sums,
-    watcher,
-    watching,
-)
+from shm.watch import state_sums, watcher, watching
+from shm.watch.engine import causes, mistaken_modes, options, persistence, readings
 from shm.watch.engine.change_point import Evidence
 from shm.watch.engine.limits import LIMITS
 from shm.watch.engine.readings import Likelihood
