@@ -24,6 +24,7 @@ from shm.pipeline.reconcile import (
     with_free_key,
 )
 from shm.store import StoredAlert
+from shm.store.alerts import TEST_DISCARDED
 from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 
@@ -60,8 +61,10 @@ def conditions_of(
 
 def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condition]:
     ended = [each for each in known if each.resolution]
-    # What other thresholds have closed may be called for again, as if it had never been raised.
-    past = [e for e in ended if e.resolution and not e.resolution.why.startswith(_JUDGED_AGAIN)]
+    # What other thresholds or a discarded test have closed may be called for again, as if it had
+    # never been raised.
+    undone = (_JUDGED_AGAIN, TEST_DISCARDED)
+    past = [e for e in ended if e.resolution and not e.resolution.why.startswith(undone)]
     is_open: set[tuple[str, float]] = set()
     for alert in (each.alert for each in known if not each.resolution):
         if why := why_over(alert, found) or _why_not_called(alert, found):

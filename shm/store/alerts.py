@@ -37,6 +37,10 @@ from shm.values import Alert
 stored_alerts = sa.select(alerts)
 
 
+TEST_DISCARDED = "test discarded by"
+"""Begins why an alert ended whose test counts no more: what its condition is, other tests say."""
+
+
 def raise_alert(
     connection: Connection,
     test_id: int | None,

@@ -158,6 +158,9 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
         return replace(found, reason="acts alone", probability=alone.acts_alone)
     unknown_leads = diagnosis.unexplained_probability > diagnosis.no_gap_probability
     if unknown_leads and not found.is_within_errors:
+        nearest = next(iter(group_causes(diagnosis.causes)), None)
+        if nearest is not None and nearest.probability > diagnosis.unexplained_probability:
+            return replace(found, reason="weak evidence", runner_up=nearest)
         return replace(found, reason=_UNKNOWN)
     return replace(
         found,
@@ -200,15 +203,22 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
         is_worth_naming = nearest.probability >= MIN_RUNNER_UP
         if is_worth_naming and nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
             return _with_claim(found, Outcome.PARTLY, nearest, left)
-        return replace(found, reason="weak evidence" if diagnosis.leading else _UNKNOWN)
+        return replace(found, reason=_name_weakness(diagnosis, nearest))
     if diagnosis.leading is None:
         is_strong = nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR
-        return replace(found, reason="much would fit" if is_strong else _UNKNOWN)
+        weak = _name_weakness(diagnosis, nearest)
+        return replace(found, reason="much would fit" if is_strong else weak)
     claim = _join(claims)
     if not claim.probability >= MIN_CLAIM:
         return replace(found, reason="none is more probable than not")
     outcome = Outcome.EXPLAINED if len(claim.causes) == 1 else Outcome.ALIKE
     return _with_claim(found, outcome, claim)
+
+
+def _name_weakness(diagnosis: Diagnosis, nearest: Claim) -> Reason:
+    """Return why the most probable claim is not made."""
+    is_behind = diagnosis.unexplained_probability >= nearest.probability
+    return _UNKNOWN if diagnosis.leading is None and is_behind else "weak evidence"
 
 
 def _with_claim(

@@ -11,6 +11,7 @@ import pytest
 from shm.pipeline.conditions import Evidence, conditions_of
 from shm.pipeline.reconcile import SHM, reconcile
 from shm.store import StoredAlert
+from shm.store.alerts import TEST_DISCARDED
 from shm.store.rows import AlertNote
 from shm.values import Alert, WatchedTest
 from tests.helpers.nouns import NOW, a_drift, a_watched_test, an_alert
@@ -122,3 +123,21 @@ def test_what_a_person_resolved_rings_only_by_two_later_visits() -> None:
     assert again(tests[:4], known) == known
     assert again(tests[:5], known) == known
     assert is_open(again(tests, known)) == [False, True]
+
+
+def test_what_the_alert_of_a_discarded_test_reported_other_tests_report() -> None:
+    """The test is discarded months after the tests behind it, and counts again later."""
+    tests = weekly(SOUND, LOST, LOST, LOST)
+    (one,) = in_order(tests, [])
+    why = f"{TEST_DISCARDED} Ann: a van on the deck"
+    ended = replace(one, resolution=AlertNote(1, "Ann", why, tests[3].time + 30 * WEEK))
+    without = [test for test in tests if test.test != "t2"]
+    raised = again(without, [ended])
+    assert is_open(raised) == [False, True]
+    assert raised[1].alert.test == "t3"
+    assert again(without, raised) == raised
+    alone = replace(raised[1], resolution=AlertNote(2, "Ann", why, tests[3].time + 31 * WEEK))
+    assert is_open(again(without[:2], [ended, alone])) == [False, False]  # nothing calls for it
+    back = again(tests, [ended, alone])
+    assert is_open(back) == [False, False, True]
+    assert back[2].alert.key == "loss:t2:again-1"

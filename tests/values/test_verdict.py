@@ -130,11 +130,23 @@ def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
 
 def test_judge_unknown_leads_beyond_errors() -> None:
     """A gap by its definition, and most probably of something unknown."""
-    found = judge(replace(without_gap(0.3, rms_z=2.1), unexplained_probability=0.6))
+    beyond, seldom = without_gap(0.3, rms_z=2.1), (cause("point_mass", 0.1),)
+    found = judge(replace(beyond, causes=seldom, unexplained_probability=0.6))
     assert (found.outcome, found.reason) == (Outcome.UNEXPLAINED, "unknown is more probable")
     assert found.probability == 0.6
     within = judge(replace(without_gap(0.3), unexplained_probability=0.6))
     assert within.outcome is Outcome.NO_GAP
+
+
+def test_judge_does_not_call_unknown_probable_beside_a_likelier_cause() -> None:
+    """Something unknown leads before no gap, and a cause before it."""
+    likelier = (cause("partial_mass", 0.6),)
+    found = without_gap(0.1, rms_z=2.1)
+    found = replace(found, causes=likelier, unexplained_probability=0.11)
+    verdict = judge(found)
+    assert (verdict.outcome, verdict.reason) == (Outcome.UNEXPLAINED, "weak evidence")
+    assert verdict.runner_up is not None
+    assert verdict.runner_up.causes == likelier
 
 
 def test_judge_no_gap_with_outlier() -> None:
