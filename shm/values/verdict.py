@@ -159,9 +159,7 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
     unknown_leads = diagnosis.unexplained_probability > diagnosis.no_gap_probability
     if unknown_leads and not found.is_within_errors:
         nearest = next(iter(group_causes(diagnosis.causes)), None)
-        if nearest is not None and nearest.probability > diagnosis.unexplained_probability:
-            return replace(found, reason="weak evidence", runner_up=nearest)
-        return replace(found, reason=_UNKNOWN)
+        return _decline(diagnosis, _with_runner_up(found, nearest), nearest)
     return replace(
         found,
         outcome=Outcome.NO_GAP,
@@ -195,19 +193,18 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
     if nearest is None or math.isnan(nearest.probability):
         known = math.isfinite(diagnosis.unexplained_probability)
         return replace(found, reason=_UNKNOWN if known else "no probabilities")
-    if nearest.probability >= MIN_RUNNER_UP:
-        found = replace(found, runner_up=nearest)
+    found = _with_runner_up(found, nearest)
     if found.is_uncertain:
         return replace(found, reason="sampler failed")
     if left:
         is_worth_naming = nearest.probability >= MIN_RUNNER_UP
         if is_worth_naming and nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
             return _with_claim(found, Outcome.PARTLY, nearest, left)
-        return replace(found, reason=_name_weakness(diagnosis, nearest))
+        return _decline(diagnosis, found, nearest)
     if diagnosis.leading is None:
-        is_strong = nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR
-        weak = _name_weakness(diagnosis, nearest)
-        return replace(found, reason="much would fit" if is_strong else weak)
+        is_behind = diagnosis.unexplained_probability >= nearest.probability
+        is_weak = not nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR
+        return replace(found, reason=_UNKNOWN if is_weak and is_behind else "much would fit")
     claim = _join(claims)
     if not claim.probability >= MIN_CLAIM:
         return replace(found, reason="none is more probable than not")
@@ -215,10 +212,17 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
     return _with_claim(found, outcome, claim)
 
 
-def _name_weakness(diagnosis: Diagnosis, nearest: Claim) -> Reason:
-    """Return why the most probable claim is not made."""
-    is_behind = diagnosis.unexplained_probability >= nearest.probability
-    return _UNKNOWN if diagnosis.leading is None and is_behind else "weak evidence"
+def _with_runner_up(found: GapVerdict, nearest: Claim | None) -> GapVerdict:
+    """Return the verdict with the most probable claim, where that is worth naming."""
+    is_worth_naming = nearest is not None and nearest.probability >= MIN_RUNNER_UP
+    return replace(found, runner_up=nearest) if is_worth_naming else found
+
+
+def _decline(diagnosis: Diagnosis, found: GapVerdict, nearest: Claim | None) -> GapVerdict:
+    """Return the verdict that claims nothing of data which leave more than the errors allow."""
+    is_behind = nearest is None or diagnosis.unexplained_probability >= nearest.probability
+    is_unknown = diagnosis.leading is None and is_behind
+    return replace(found, reason=_UNKNOWN if is_unknown else "weak evidence")
 
 
 def _with_claim(

@@ -20,6 +20,7 @@ from shm.inference.answer.updating import log_class_prior
 from shm.inference.options import Progress, silent
 from shm.inference.sampler.density import find_peaks
 from shm.inference.sampler.mixture import normalised
+from shm.inference.sampler.sampling import most_likely_error
 from shm.models import AS_DESCRIBED, MODELS, AsMade, applicable, check_baseline
 from shm.models.classes.base import held_otherwise
 from shm.values import Hanger, ModalTest
@@ -67,19 +68,19 @@ def choose_baseline(
 def place_sensors(problem: GapProblem) -> Observations:
     """Return the data with the sensors where they most probably are, by the hanger alone.
 
-    A place errs to first order, about where it is taken to be: three centimetres off bend a shape
-    of high order by more than its errors. What moving the sensors takes of their error predictions
-    give back, so that the error's prior is still about the stated place. Nothing is moved where one
-    would be farther off than a tape errs: there the hanger has a gap.
+    Errors of places count to first order about the places in use, and three centimetres are too
+    far for a shape of high order. Predictions are shifted back by what the move explains
+    (`misplaced`), so that the prior of an error stays about the stated place. No sensor is moved
+    where one would be farther off than a tape errs: there the hanger has a gap.
     """
     stated, count = problem.observations, problem.design.frequencies
     for _ in range(2 if len(problem.design.shape_mode) else 0):  # steps of Gauss and Newton
-        z = find_peaks(Target(problem, Hypothesis()), find_starts(problem))[0].z[None]
-        residual = (problem.value - problem.predict(Hypothesis(), z))[0]
-        by = problem.likelihood(Hypothesis())
-        error = by.nodes[int(by.by_node(residual[None])[0].argmax())].covariance
+        target = Target(problem, Hypothesis())
+        z = find_peaks(target, find_starts(problem))[0].z[None]
+        error = most_likely_error(target, z)
         covariance = np.diag(error.shape) + error.shape_loads @ error.shape_loads.T
-        size = problem.place_loads.T @ np.linalg.solve(covariance, residual[count:])
+        left = np.linalg.solve(covariance, target.residual(z)[0, count:])
+        size = problem.place_loads.T @ left
         if (np.abs(size) > MOST_REPEATED).any():
             return stated
         places_m = np.array(stated.design.places_m) + size * problem.hanger.scatter.sensor_place_m

@@ -99,7 +99,8 @@ class Observations:
     does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
     holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
     `rounding` (F,), None for none, is the standard deviation that rounding adds to frequencies.
-    `misplaced` (S,), None for none, is what the design's places hold of the sensors' errors.
+    `misplaced` (S,), None for none, is what moving sensors from their stated places to those of the
+    design does to shapes, to first order.
     `assumed` is what the hanger's description assumes of errors.
     """
 
