@@ -53,7 +53,10 @@ _BOUNDS = np.array([(-7, 4), (-3, 3), *[(-2.5, 4)] * 4, (0.01, 3)]).T
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """ln f (2, MOST_ORDER) by plane and order, NaN where not measured, and the variance of each."""
+    """Hold measured modes: ln f by plane and order, and the variance of each.
+
+    Both are (2, MOST_ORDER); `log_f` is NaN where a mode was not measured.
+    """
 
     log_f: FloatArray
     variance: FloatArray
@@ -72,12 +75,15 @@ class Seen:
         return np.isfinite(self.log_f)
 
     def over(self, other: Seen) -> Seen:
+        """Return the ratios of these frequencies to others."""
         return Seen(self.log_f - other.log_f, self.variance + other.variance)
 
     def times(self, factor: float) -> Seen:
+        """Return the frequencies so many times as high."""
         return replace(self, log_f=self.log_f + math.log(factor))
 
     def exchanged(self) -> Seen:
+        """Return the modes with the planes exchanged."""
         return Seen(self.log_f[::-1], self.variance[::-1])
 
 
