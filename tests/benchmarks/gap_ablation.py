@@ -25,7 +25,7 @@ import numpy as np
 
 from shm.gap.causes import baseline, outliers, search
 from shm.gap.causes.probabilities import ByLaws
-from shm.gap.hypotheses import noise, problem, sampling
+from shm.gap.hypotheses import noise, observations, problem, sampling
 from shm.values import Outcome
 from shm.values.posterior import ENOUGH_EFFECTIVE
 from tests.benchmarks.blind_scores import SURE, Row
@@ -67,7 +67,10 @@ VARIANTS: dict[str, Sequence[Change]] = {
     "planes' errors never alike": [
         (noise, "_correlations", lambda of: [(np.eye(of.design.frequencies), 1.0)])
     ],
-    "shapes as certain as stated": [(noise, "_factors_of_shapes", lambda of: [(1.0, 1.0)])],
+    "shapes as certain as stated": [(noise, "_factor_of_shapes", lambda of: 1.0)],
+    "planes never turn": [
+        (observations, "turn_of_axes", lambda test, hanger: np.zeros(len(test.modes)))
+    ],
     "remainders over orders alone": [(noise, "_patterns", noise._over_orders)],
     "no mirrored places": [(search.Search, "_with_mirrored", lambda of, target, peaks: peaks)],
     "exact thermometers": [

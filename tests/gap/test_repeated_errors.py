@@ -109,7 +109,8 @@ def test_loads_of_sensors_do_not_change_a_shapes_length(
 ) -> None:
     scaling = ShapeScaling.measured(problem.observations)
     along = scaling.weight * value
-    for column in problem.repeated.sensors.T:
+    loads = problem.repeated.sensors[:, : len(problem.repeated.sensor_errors)]
+    for column in loads.T:
         assert np.abs(np.bincount(scaling.shape, along * column)).max() < 1e-12
 
 
@@ -149,12 +150,33 @@ def test_the_section_varies_about_its_mean_by_what_the_description_says() -> Non
     assert counts[0] > counts[1] > counts[2] >= 1
 
 
-def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
-    hanger = replace(HANGER, scatter=replace(HANGER.scatter, along=0.0))
+def test_what_one_plane_gains_by_a_section_that_is_not_round_the_other_loses(
+    problem: GapProblem,
+) -> None:
+    """The load is the change by a bending stiffness that is one standard deviation larger."""
+    design, sd = problem.design, DEFAULTS.out_of_round_sd.value
+    theta = problem.described.theta(problem.near)
+    plain = problem.model.physical(theta)
+    whole = Zone(np.zeros(1), np.array([HANGER.length_m]), np.array([1 + sd]), np.ones(1))
+    bars = (replace(plain, zones=(*plain.zones, *more)) for more in ((whole,), ()))
+    solved = [np.log(solve(bar, 5, np.empty(0), shapes=False).frequency_hz[0]) for bar in bars]
+    stiffer = (solved[0] - solved[1])[design.frequency_plane, design.frequency_order - 1]
+    copies = problem.model.physical(np.repeat(theta, STRETCHES + 2, axis=0))
+    found = section_loads(design, copies, HANGER)[:, -1]
+    expected = np.where(design.frequency_plane == 0, stiffer, -stiffer)
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_a_round_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
+    hanger = replace(
+        HANGER,
+        scatter=replace(HANGER.scatter, along=0.0),
+        assumptions=HANGER.assumptions.with_numbers(out_of_round_sd=0.0),
+    )
     found = problem_of(simulated(**PLAN), hanger=hanger)
     design = found.design
     theta = found.described.theta(found.near)
-    bars = found.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
+    bars = found.model.physical(np.repeat(theta, STRETCHES + 2, axis=0))
     assert not section_loads(design, bars, hanger).any()
     plane, order = design.frequency_plane, design.frequency_order
     frequency_hz = np.exp(found.observations.value[: design.frequencies])

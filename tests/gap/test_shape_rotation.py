@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from shm.gap.hypotheses.noise import nodes
-from shm.gap.hypotheses.observations import observed, separate_turn
+from shm.gap.hypotheses.observations import observed, separate_turn, turn_of_axes
 from shm.gap.hypotheses.repeated_errors import turn_loads
-from shm.values import FloatArray, ModalTest, Mode
+from shm.values import PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.gap_campaigns import problem_of, simulated
 from tests.helpers.hangers import HANGER_3
 
 PLAN: dict[str, Any] = {"modes": 4, "as_made": False, "shape_sd": 1e-3, "hanger": HANGER_3}
+APART = replace(HANGER_3, assumptions=HANGER_3.assumptions.with_numbers(plane_coupling=1e-6))
+"""Its planes are so far apart that none of its modes turns by itself."""
 SIZE = np.array([0.1, 0.4, 1.0, 0.8])
 
 
@@ -27,6 +29,16 @@ def test() -> ModalTest:
 def _may_be_turned(mode: Mode, rad: float) -> Mode:
     shape = tuple(replace(p, sd=float(np.hypot(p.sd, rad * p.value))) for p in mode.shape)
     return replace(mode, shape=shape)
+
+
+def _by_sensors(mode: Mode) -> Mode:
+    """The mode as sensors see it that are turned by up to a degree."""
+    degrees = (0.0, 1.0, -1.0, 0.5) if mode.plane == PLANES[0] else (0.0, -1.0, 1.0, -0.5)
+    shape = [
+        _turned(replace(mode, shape=(point,)), np.radians(angle)).shape[0]
+        for point, angle in zip(mode.shape, degrees, strict=True)
+    ]
+    return replace(mode, shape=tuple(shape))
 
 
 def _turned(mode: Mode, rad: float) -> Mode:
@@ -58,7 +70,7 @@ def test_what_grows_with_the_shape_is_the_turn(
 
 
 def test_without_turns_nothing_changes(test: ModalTest) -> None:
-    found = observed([test], HANGER_3)
+    found = observed([test], APART)
     assert found.turned is None
     assert turn_loads(found).shape == (64, 0)
 
@@ -68,10 +80,10 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
     """The chi-square of the shapes grows by one for it, and by far more where it is not stated."""
 
     def chi_square(mode: Mode) -> float:
-        problem = problem_of([replace(test, modes=(mode, *rest))], hanger=HANGER_3)
+        problem = problem_of([replace(test, modes=(mode, *rest))], hanger=APART)
         covariance = nodes(problem.observations, problem.repeated)[0].covariance
         whole = np.diag(covariance.shape) + covariance.shape_loads @ covariance.shape_loads.T
-        expected = observed([test], HANGER_3).value[test_modes:]
+        expected = observed([test], APART).value[test_modes:]
         left = problem.observations.value[test_modes:] - expected
         return float(left @ np.linalg.solve(whole, left))
 
@@ -79,6 +91,39 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
     test_modes = len(test.modes)
     assert chi_square(_turned(_may_be_turned(first, rad), rad)) < 2
     assert chi_square(_turned(first, rad)) > 20
+
+
+def test_a_coupling_turns_a_pair_by_its_share_of_their_distance(test: ModalTest) -> None:
+    """As the eigenvectors of two coupled oscillators; a lone mode as its neighbours."""
+    coupling, hz, apart = HANGER_3.assumptions.plane_coupling.value, 7.0, 0.03
+    lower, upper = np.log(hz), np.log(hz) + apart
+    _, vectors = np.linalg.eigh(np.array([[lower, coupling], [coupling, upper]]))
+    expected = abs(np.arctan(vectors[1, 0] / vectors[0, 0]))
+    pair = [
+        Mode(plane, 1, float(np.exp(at))) for plane, at in zip(PLANES, (lower, upper), strict=True)
+    ]
+    modes = (*pair, Mode(PLANES[0], 2, 15.0))
+    turn = turn_of_axes(replace(test, modes=modes), HANGER_3)
+    assert turn == pytest.approx(np.full(3, expected), rel=0.01)
+    alone = replace(test, modes=modes[:1])
+    assert turn_of_axes(alone, HANGER_3) == pytest.approx(np.zeros(1))
+
+
+@pytest.mark.parametrize("degrees", [5.0, 40.0])
+def test_a_pair_that_coincides_may_be_turned_freely(test: ModalTest, degrees: float) -> None:
+    """And sensors by themselves, at once: nothing is left but their usual errors."""
+    first, *rest = test.modes
+    turned = replace(
+        test, modes=tuple(map(_by_sensors, (_turned(first, np.radians(degrees)), *rest)))
+    )
+    close = replace(HANGER_3, assumptions=HANGER_3.assumptions.with_numbers(plane_coupling=0.2))
+    problem = problem_of([turned], hanger=close)
+    covariance = nodes(problem.observations, problem.repeated)[0].covariance
+    whole = np.diag(covariance.shape) + covariance.shape_loads @ covariance.shape_loads.T
+    straight = observed([test], close)
+    count = straight.design.frequencies
+    left = problem.observations.value[count:] - straight.value[count:]
+    assert left @ np.linalg.solve(whole, left) < 4
 
 
 def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: ModalTest) -> None:

@@ -36,6 +36,7 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_READINGS = 2  # of one there is no difference
+_FREE_TURN = 2.0  # numerical: radians; far more than a right angle, so that none counts
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,11 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     modes = [(t, mode) for t, test in enumerate(tests) for mode in test.modes]
     frequency = np.array([mode.frequency_hz for _, mode in modes])
     sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
-    least = _least_sd(tests)
-    shapes = [_as_turned(_components(k, mode), least) for k, (_, mode) in enumerate(modes)]
-    components, lengths = _scaled(shapes)
+    error = hanger.assumptions.shape_error.value
+    turn = np.concatenate([turn_of_axes(test, hanger) for test in tests])
+    components, lengths = _scaled(
+        [_with_errors(_components(k, mode), error, turn[k]) for k, (_, mode) in enumerate(modes)]
+    )
     survey = survey_of(tests)
     design = Design(
         survey=survey,
@@ -183,26 +186,50 @@ def _components(index: int, mode: Mode) -> list[_Component]:
     return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
 
 
-def _as_turned(shape: list[_Component], least: float) -> list[_Component]:
-    """A shape of two-axis sensors whose direction may be uncertain."""
+def _with_errors(shape: list[_Component], error: float, axes: float) -> list[_Component]:
+    """A shape whose components err by a part of its length more than stated, each by itself.
+
+    Where all sensors have two axes its direction may be uncertain, by its `axes` (radians) or by
+    noise.
+    """
+    least = error * math.hypot(*(each.value for each in shape))
     pairs = list(zip(shape[::2], shape[1::2], strict=False))
-    if len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
-        return shape
+    if not shape or len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
+        return [replace(each, sd=math.hypot(each.sd, least)) for each in shape]
     size = np.array([max(abs(one.value), abs(other.value)) for one, other in pairs])
-    sds, turn = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
+    sds, noise = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
+    swings = _swings(np.array([[one.value, other.value] for one, other in pairs]))
+    across = math.hypot(noise, axes) * swings
     return [
-        replace(
-            each, sd=float(sd), turned=turn * (partner.value if each.axis == 0 else -partner.value)
-        )
-        for (one, other), sd in zip(pairs, sds, strict=True)
-        for each, partner in ((one, other), (other, one))
+        replace(each, sd=float(sd), turned=turned)
+        for pair, sd, moved in zip(pairs, np.hypot(sds, least), across.tolist(), strict=True)
+        for each, turned in zip(pair, (0.0, moved), strict=True)
     ]
 
 
-def _least_sd(tests: Sequence[ModalTest]) -> float:
-    """The smallest standard deviation of all shapes' components; 0 where there is none."""
-    each = (p.sd for test in tests for mode in test.modes for p in mode.shape)
-    return min((sd for sd in each if sd > 0), default=0.0)
+def _swings(shape: FloatArray) -> FloatArray:
+    """How far each place (places,) of a shape (places, 2) swings, in whatever direction."""
+    direction = np.linalg.svd(shape)[2][0]
+    return np.asarray(np.copysign(np.hypot(*shape.T), shape @ direction))
+
+
+def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
+    """The standard deviation (modes,) of the direction in which each mode swings, in radians.
+
+    A round bar swings in the planes of its supports only as far as these tell the planes apart:
+    what couples them turns a pair of modes by its share of their distance (first order of
+    perturbation), freely where they all but coincide. Where the other plane's mode is missing, the
+    distance is that of the next orders. 0 of less than sensors are turned, and of one plane alone.
+    """
+    at = {(mode.plane, mode.order): math.log(mode.frequency_hz) for mode in test.modes}
+    orders = sorted({order for _, order in at if all((plane, order) in at for plane in PLANES)})
+    if not orders:
+        return np.zeros(len(test.modes))
+    apart = [abs(at[PLANES[0], order] - at[PLANES[1], order]) for order in orders]
+    distance = np.interp([mode.order for mode in test.modes], orders, apart)
+    coupling = hanger.assumptions.plane_coupling.value
+    turn = coupling / np.maximum(distance, coupling / _FREE_TURN)
+    return np.where(turn > hanger.scatter.sensor_turn, turn, 0.0)
 
 
 def _scaled(shapes: Sequence[list[_Component]]) -> tuple[list[_Component], FloatArray]:

@@ -303,7 +303,7 @@ class GapProblem:
         They are of the section along the bar, the sensors' mass and the supports' give.
         """
         theta = self.described.theta(self.near)
-        copies = self.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
+        copies = self.model.physical(np.repeat(theta, STRETCHES + 2, axis=0))
         section = section_loads(design, copies, self.hanger)
         if not self.hanger.as_hanger:
             return section

@@ -74,16 +74,19 @@ class Repeated:
 
 
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:
-    """Loads (F, k) of the section along the bar, which varies about its mean.
+    """Loads (F, k) of the section, which varies along the bar about its mean and is not quite round.
 
-    `physical` holds `STRETCHES + 1` hangers alike. Mass goes with the section, bending stiffness
-    with its square.
+    `physical` holds `STRETCHES + 2` hangers alike. Mass goes with the section, bending stiffness
+    with its square; what one plane gains by a section that is not round, the other loses.
     """
     edges_m = np.linspace(0.0, hanger.length_m, STRETCHES + 1)
     influence = _influence(physical, edges_m, int(design.frequency_order.max()))
+    influence = influence[design.frequency_plane, design.frequency_order - 1]
     reach_m = hanger.assumptions.section_reach_m.value
     ways = section_ways(hanger.length_m, hanger.scatter.along, reach_m)
-    return np.asarray((influence @ ways)[design.frequency_plane, design.frequency_order - 1])
+    side = np.array([1.0, -1.0])[design.frequency_plane]
+    oval = hanger.assumptions.out_of_round_sd.value * side * influence[:, -1]
+    return np.column_stack([influence[:, :-1] @ ways, oval])
 
 
 def section_ways(length_m: float, sd: float, reach_m: float) -> FloatArray:
@@ -103,10 +106,15 @@ def section_ways(length_m: float, sd: float, reach_m: float) -> FloatArray:
 
 
 def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> FloatArray:
-    """Change (planes, orders, stretches) of log frequencies by the section of each stretch."""
-    start_m, end_m = np.append(edges_m[:-1], 0.0), np.append(edges_m[1:], 0.0)
-    factor = np.append(np.full(len(edges_m) - 1, 1 + _STRETCH_CHANGE), 1.0)
-    thick = Zone(start_m, end_m, factor**2, factor)
+    """Change (planes, orders, stretches + 1) of log frequencies by the section of each stretch.
+
+    The last is that by the bending stiffness of the whole bar.
+    """
+    start_m, end_m = np.append(edges_m[:-1], [0.0, 0.0]), np.append(edges_m[1:], edges_m[[-1, 0]])
+    larger, stretches = 1 + _STRETCH_CHANGE, len(edges_m) - 1
+    bending = np.append(np.full(stretches, larger**2), [larger, 1.0])
+    mass = np.append(np.full(stretches, larger), [1.0, 1.0])
+    thick = Zone(start_m, end_m, bending, mass)
     found = solve(replace(physical, zones=(*physical.zones, thick)), orders, _NOWHERE, shapes=False)
     log = np.log(found.frequency_hz)
     return np.asarray(np.moveaxis(log[:-1] - log[-1], 0, 2) / _STRETCH_CHANGE)
@@ -235,16 +243,18 @@ class ShapeScaling:
 def turn_loads(observations: Observations) -> FloatArray:
     """Loads (S, k) of the turns of modes whose direction is uncertain, two for each.
 
-    The first is that of a small turn; the second what a larger one takes off the length along the
-    measured shape: turn^2 / 2, whose root mean square is sqrt(3) / 2 times the turn's variance.
+    A mode that swings in its plane gains across it by the turn, and loses along it by turn^2 / 2,
+    whose root mean square is sqrt(3) / 2 times the turn's variance.
     """
     design, columns = observations.design, []
     value = observations.value[design.frequencies :]
     for mode in np.unique(design.shape_mode[turned_modes(observations)]):
         in_shape = design.shape_mode == mode
-        turned = in_shape * _turned_components(observations)
-        variance = (turned @ turned) / (value[in_shape] @ value[in_shape])
-        columns += [turned, np.sqrt(3) / 2 * variance * in_shape * value]
+        across, along = np.zeros((2, len(value)))
+        across[in_shape] = _turned_components(observations)[in_shape]
+        turn = np.sqrt(across @ across / (value[in_shape] @ value[in_shape]))
+        along[in_shape] = np.sqrt(3) / 2 * turn * across[in_shape].reshape(-1, 2)[:, ::-1].ravel()
+        columns += [across, along]
     return np.column_stack(columns) if columns else np.zeros((len(value), 0))
 
 

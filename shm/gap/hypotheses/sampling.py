@@ -339,7 +339,10 @@ def approximate(target: Target, peaks: Sequence[Peak], draws: int, rng: np.rando
     log = np.array([peak.log_evidence for peak in peaks])
     counts = rng.multinomial(draws, normalised(log))
     found = np.vstack(
-        [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
+        [
+            rng.multivariate_normal(p.z, p.covariance, n, check_valid="ignore")  # rounding
+            for p, n in zip(peaks, counts, strict=True)
+        ]
     )
     nan = float("nan")
     return _fit(_Collapsed(target, peaks), peaks, found, (laplace(peaks), nan), nan, "normal")
