@@ -74,7 +74,7 @@ class Repeated:
 
 
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:
-    """Loads (F, k) of the section, which varies along the bar about its mean and is not quite round.
+    """Loads (F, k) of a section that varies along the bar about its mean and is not quite round.
 
     `physical` holds `STRETCHES + 2` hangers alike. Mass goes with the section, bending stiffness
     with its square; what one plane gains by a section that is not round, the other loses.
