@@ -482,6 +482,7 @@ def simulate(
         (5, 100.0)
     """
     check_hanger(hanger)
+    check_count("seed", seed, 1, least=0)
     if not hanger.as_hanger:
         raise UsageError(
             f"hanger {hanger.id} is not clamped at both ends, or carries no tension: it cannot be "

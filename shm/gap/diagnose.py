@@ -217,8 +217,9 @@ def _shapes_off(p_values: tuple[float, float]) -> tuple[str, ...]:
     if not of_shapes < MIN_FIT_P_VALUE <= of_frequencies:
         return ()
     return (
-        f"{SHAPES_OFF}: the frequencies fit within their errors, the shapes do not. Check the "
-        "places and directions of the sensors and the standard deviations of the shapes.",
+        f"{SHAPES_OFF}: by the most probable explanation the frequencies fit within their errors, "
+        "the shapes do not. Check the places and directions of the sensors and the standard "
+        "deviations of the shapes.",
     )
 
 
