@@ -22,6 +22,7 @@ import difflib
 import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -172,3 +173,12 @@ def needing(extra: str) -> Iterator[None]:
             f"{error.name or 'a library'} is not installed.",
             remedy=f"Install it with `pip install 'shm[{extra}]'`.",
         ) from error
+
+
+def check_count(name: str, given: object, usual: int, least: int = 1) -> None:
+    """Raise UsageError if `given` is no whole number from `least` on."""
+    if not isinstance(given, Integral) or isinstance(given, bool) or given < least:
+        raise UsageError(
+            f"{name} is {given!r}, not a whole number of at least {least}.",
+            remedy=f"Leave it out, or write {name}={usual}.",
+        )

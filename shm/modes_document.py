@@ -36,6 +36,7 @@ _ALWAYS = ("id", "modes", "time", "temperature_c", "amplitude")
 _MODE_KEYS = tuple(field.name for field in fields(Mode))
 _MASS_KEYS = tuple(field.name for field in fields(AddedMass))
 _SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
+_MAKE = "Make one of recordings: `shm identify FILE --out t.modes.json`."
 _LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold when read
 
 
@@ -77,7 +78,7 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
         document = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise BadInput(
-            f"not JSON: {error.msg}.", file=path, line=error.lineno, remedy="Write it anew."
+            f"not JSON: {error.msg}.", file=path, line=error.lineno, remedy=_MAKE
         ) from error
     except OSError as error:
         raise BadInput(f"cannot be read: {error}.", file=path, remedy="Check the path.") from error
@@ -102,7 +103,7 @@ def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
         raise BadInput(
             f"not a modal-tests document of schema {MODES_SCHEMA}.",
             file=file,
-            remedy="Make one with `shm identify FILE --json`.",
+            remedy=_MAKE,
         )
     hanger = document.get("hanger")
     if hanger is not None and (type(hanger) is not int or not 0 <= hanger < 2**31):

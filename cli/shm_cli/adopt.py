@@ -31,7 +31,7 @@ from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 @click.option(
     "--baseline",
     default="",
-    show_default="of the diagnosis",
+    show_default="of the diagnosis, else the hanger's own",
     shell_complete=completion.models,
     help="A model class.",
 )

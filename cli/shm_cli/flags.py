@@ -93,12 +93,26 @@ class NewFile(click.Path):
                 f"{path} is no name of a {self._ending} file.",
                 remedy=f"Let it end in {self._ending}: that is what is written.",
             )
-        folder = path.absolute().parent
-        if not folder.is_dir():
-            raise BadInput(f"{folder} is no folder.", remedy="Make it first, or name another.")
-        if not os.access(folder, os.W_OK):
-            raise BadInput(f"nothing can be written into {folder}.", remedy="Name another.")
-        return path
+        return _writable(path)
+
+
+class NewFolder(click.Path):
+    """A path at which a folder is, or can be made in one that is there."""
+
+    def convert(
+        self, value: Any, parameter: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        return _writable(Path(os.fsdecode(super().convert(value, parameter, context))))
+
+
+def _writable(path: Path) -> Path:
+    """Return the path; raise BadInput where its folder is not there or takes no files."""
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise BadInput(f"{folder} is no folder.", remedy="Make it first, or name another.")
+    if not os.access(folder, os.W_OK):
+        raise BadInput(f"nothing can be written into {folder}.", remedy="Name another.")
+    return path
 
 
 _JSON = "shm_cli.json"
@@ -128,7 +142,10 @@ who = click.option(
     help="For the record.",
 )
 figures = click.option(
-    "--figures", type=FOLDER, metavar="DIR", help="Write each figure as a PNG here."
+    "--figures",
+    type=NewFolder(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Write each figure as a PNG here.",
 )
 seed = click.option("--seed", type=click.IntRange(min=0), default=1, help="Random seed.")
 # Judgement: below 100 no 90 % interval has five draws beyond each end; a million fill the memory.

@@ -18,7 +18,6 @@ import numpy as np
 
 from shm import bridge
 from shm.api.arguments import (
-    check_count,
     check_hanger,
     check_names,
     check_records,
@@ -28,7 +27,7 @@ from shm.api.in_python import in_python
 from shm.api.placing import Places, Planes, with_places
 from shm.api.stored import Store
 from shm.bridge.hanger import hanger_of
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, check_count
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
 from shm.gap.check import CheckOptions
@@ -318,6 +317,7 @@ def _options(
             f"there is no sampler {sampler!r}.", remedy=f"Name one of {', '.join(SAMPLERS)}."
         )
     check_count("samples", samples, UpdateOptions.samples)
+    check_count("seed", seed, UpdateOptions.seed, least=0)
     options = UpdateOptions(samples, seed, sampler=sampler)
     return calibrate(options, modal_tests(calibrated_by, "calibrated_by"), models, progress)
 
@@ -398,6 +398,7 @@ def diagnose(
         check_names("without", without, "point_mass")
         check_names("hold_out", hold_out, "t1")
         check_count("draws", draws, _OF_GAP.draws)
+        check_count("seed", seed, _OF_GAP.seed, least=0)
         options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
         return diagnosed(modal_tests(tests), hanger, options, progress)
 
@@ -433,6 +434,7 @@ def check_gap(
         check_names("effects", effects, "point_mass")
         check_count("seeds", seeds, 1)
         check_count("sound", sound, 5, least=0)
+        check_count("seed", seed, 1, least=0)
         options = CheckOptions(tuple(effects), baseline, seeds, sound, seed=seed)
         return checked(modal_tests(tests), hanger, options, progress)
 
@@ -480,6 +482,7 @@ def simulate(
         (5, 100.0)
     """
     check_hanger(hanger)
+    check_count("seed", seed, 1, least=0)
     if not hanger.as_hanger:
         raise UsageError(
             f"hanger {hanger.id} is not clamped at both ends, or carries no tension: it cannot be "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Integral
 
 from shm.errors import UsageError
 from shm.identify import Identification
@@ -47,13 +46,4 @@ def check_names(name: str, given: object, example: str) -> None:
         raise UsageError(
             f"{name} is the text {given!r}, not a list of names.",
             remedy=f"Write {name}=[{given or example!r}].",
-        )
-
-
-def check_count(name: str, given: object, usual: int, least: int = 1) -> None:
-    """Raise UsageError if `given` is no whole number from `least` on."""
-    if not isinstance(given, Integral) or isinstance(given, bool) or given < least:
-        raise UsageError(
-            f"{name} is {given!r}, not a whole number of at least {least}.",
-            remedy=f"Leave it out, or write {name}={usual}.",
         )

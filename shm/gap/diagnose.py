@@ -46,7 +46,7 @@ from shm.values import (
     NextMeasurement,
     TensionEstimate,
 )
-from shm.values.verdict import DOUBTFUL
+from shm.values.verdict import DOUBTFUL, MIN_FIT_P_VALUE, SHAPES_OFF
 
 _ATTRIBUTION = 0.85
 """The part of a diagnosis's time that goes into finding the cause."""
@@ -105,7 +105,7 @@ def examined(
         groups=attribution.groups,
         invisible=attribution.invisible,
         left_out=options.without,
-        fit_p_value=attribution.p_value,
+        fit_p_value=min(attribution.p_values),
         model_error_percent=100 * best.model_error,
         shrinkage=shrinkage(problem, before, after, held),
         tension_before_n=before_n,
@@ -116,6 +116,7 @@ def examined(
             *_states(problem, before, after, (before_n, after_n)),
             *remark_on_damping(clear.whole.observations),
             *found.remarks,
+            *_shapes_off(attribution.p_values),
             *describe_excluded(clear, excluded),
             *describe_doubtful(doubted),
         ),
@@ -208,6 +209,18 @@ def _states(
             f"{most:g} times nominal): check nominal_tension_n and the description."
         )
     return tuple(found)
+
+
+def _shapes_off(p_values: tuple[float, float]) -> tuple[str, ...]:
+    """Return a remark where the frequencies fit and the shapes do not."""
+    of_frequencies, of_shapes = p_values
+    if not of_shapes < MIN_FIT_P_VALUE <= of_frequencies:
+        return ()
+    return (
+        f"{SHAPES_OFF}: by the most probable explanation the frequencies fit within their errors, "
+        "the shapes do not. Check the places and directions of the sensors and the standard "
+        "deviations of the shapes.",
+    )
 
 
 def _cause(problem: GapProblem, explanation: Explanation) -> Cause:

@@ -51,7 +51,8 @@ from shm.watch.engine.options import reference_of
 class AdoptionRequest:
     """Request to adopt `effects`, each at a place (`at`) unless the diagnosis tells it.
 
-    `baseline` is the class to which they are added; empty: that of the latest diagnosis, or beam1.
+    `baseline` is the class to which they are added; empty: that of the latest diagnosis,
+    without one the hanger's own.
     """
 
     effects: tuple[str, ...]
@@ -117,7 +118,10 @@ def adopt(
     before, baseline = _in_force(store, hanger)
     diagnosis = find_latest_diagnosis(store, hanger.id)
     tests = store.tests.list_all(hanger.id)
-    name = adopted_name(request.effects, request.at, request.baseline, hanger, diagnosis, tests)
+    # Without a diagnosis the class in force: it is the one whose gap is told as that before.
+    in_force = "" if diagnosis else baseline.posterior.model.partition("+")[0]
+    known = request.baseline or in_force
+    name = adopted_name(request.effects, request.at, known, hanger, diagnosis, tests)
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
@@ -178,7 +182,6 @@ def _adoption(
     )
 
 
-_FIRST_BASELINE = "beam1"
 _SHARE = 0.9  # the interval of every report
 
 
@@ -204,7 +207,7 @@ def adopted_name(
         _part(effect, place, reference_c, hanger, cause)
         for effect, place in zip(effects, places, strict=True)
     ]
-    known = baseline or (stored.diagnosis.baseline if stored else _FIRST_BASELINE)
+    known = stored.diagnosis.baseline if stored and not baseline else baseline
     return AdoptedName(known, tuple(parts))
 
 

@@ -26,7 +26,7 @@ from shm.values import (
     TensionEstimate,
     effect_label,
 )
-from shm.values.verdict import Reason
+from shm.values.verdict import SHAPES_OFF, Reason
 
 if TYPE_CHECKING:
     from shm.report.contents import DiagnosisSheet
@@ -57,7 +57,7 @@ _REASONS: Mapping[Reason, str] = {
     "misses the errors": "no gap can be shown, though the baseline {baseline} misses the "
     "frequencies by more than the stated errors",
     "less probable than not": "no cause is claimed, for it may be that there is no gap",
-    "poor fit": "measurements as far off would come by chance with probability {p_value} only",
+    "poor fit": "{what} as far off would come by chance with probability {p_value} only",
     "large misfit": "{misfit} % of the frequencies (rms)",
     "large residuals": "{rms_z} standard deviations (rms)",
     "acts alone": "something may act on {alone} alone, probability {acts_alone}",
@@ -74,7 +74,7 @@ _HELD_OUT: Mapping[bool | None, str] = {
     True: "",
     False: "Where they were held out of the fit the frequencies come no nearer: do not rely on the "
     "cause yet.",
-    None: "Nothing was held out of the fit to check the cause.",
+    None: "Nothing that the cause moves was held out of the fit to check it.",
 }
 _UNCERTAIN = "the sampler failed, so the answer is uncertain; "
 _DOUBTED = "make sure first that these tests are of this hanger: "
@@ -109,6 +109,7 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
     """Return the words that the sentences of outcomes and reasons may hold."""
     alone, unknown = verdict.alone, diagnosis.unexplained_probability
     left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
+    are_shapes_off = any(each.startswith(SHAPES_OFF) for each in diagnosis.remarks)
     words = {
         "chance": formatting.spoken_probability(verdict.probability),
         "due": "is explained by" if verdict.probability >= _SURE else "is most likely due to",
@@ -116,6 +117,7 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
         "baseline": diagnosis.baseline,
         "modes": _count_modes(diagnosis) if verdict.is_few else "",
         "possible": _explain_misfit(diagnosis) if verdict.reason == "misses by percents" else "",
+        "what": "mode shapes" if are_shapes_off else "measurements",
         "p_value": formatting.spoken_probability(verdict.fit_p_value),
         "rms_z": formatting.plain(verdict.rms_z, 2),
         "misfit": formatting.plain(diagnosis.shrinkage.rms_after_percent, 2),
@@ -324,7 +326,7 @@ def _give_tension(diagnosis: Diagnosis) -> Fact | None:
 def _give_fit(verdict: GapVerdict) -> Fact | None:
     if math.isnan(verdict.fit_p_value):
         return None
-    sds = f"{formatting.plain(verdict.rms_z, 2)} standard deviations rms, "
+    sds = f"frequencies {formatting.plain(verdict.rms_z, 2)} standard deviations rms, "
     return (
         "What is left",
         "within the errors" if verdict.is_within_errors else "more than the errors",

@@ -222,7 +222,7 @@ def probability(value: float) -> str:
         return "not known"
     if value > 0.995:
         return "> 0.99"
-    return "< 0.01" if value < 0.005 else f"{value:.2f}"
+    return "< 0.01" if value < 0.01 else f"{value:.2f}"
 
 
 def spoken_probability(value: float) -> str:

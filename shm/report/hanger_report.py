@@ -396,7 +396,7 @@ def structure_paper(data: StructureReport) -> Paper:
         ),
         generated_at=data.generated_at,
         version=data.version,
-        closing="± is half the 90 % interval; times are UTC.",
+        closing=f"{CREDIBLE}; times are UTC.",
     )
 
 

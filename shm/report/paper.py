@@ -63,7 +63,7 @@ def read_logo(path: Path | None) -> Logo:
 
 Fact = tuple[str, str, str]
 """Return what, value, and what belongs to it."""
-CREDIBLE = "Intervals are central 90 % credible intervals"
+CREDIBLE = "Intervals are central 90 % credible intervals, ± is half of one"
 
 
 @dataclass(frozen=True)

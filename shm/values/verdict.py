@@ -65,6 +65,8 @@ Reason = Literal[
 ]
 DOUBTFUL = "Doubtful"
 """How a remark begins that doubts of which hanger the tests are."""
+SHAPES_OFF = "Mode shapes are off"
+"""How a remark begins where the shapes alone make the fit poor."""
 _UNKNOWN: Reason = "unknown is more probable"
 
 

@@ -36,6 +36,7 @@ REFUSED: tuple[tuple[Call, type[ShmError], str, str], ...] = (
     (lambda _: shm.update(TEST, HANGER, samples=1.5), UsageError, "samples is 1.5", "samples=1000"),  # type: ignore[arg-type]
     (lambda _: shm.select(TEST, HANGER, models="beam1"), UsageError, "'beam1'", "models=['beam1']"),
     (lambda _: shm.diagnose(TEST, HANGER, draws=-1), UsageError, "draws is -1", "draws=1000"),
+    (lambda _: shm.diagnose(TEST, HANGER, seed=-1), UsageError, "seed is -1", "seed=1"),
     (lambda _: shm.diagnose(TEST, HANGER, without="sag"), UsageError, "'sag'", "without=['sag']"),
     (lambda _: shm.check_gap((), HANGER, seeds=0), UsageError, "seeds is 0", "seeds=1"),
     (lambda _: shm.simulate(3), UsageError, "hanger is 3", "shm.round_bar("),  # type: ignore[arg-type]

@@ -102,7 +102,7 @@ def _without_the_planted(taught: Lesson, clear: Cleared) -> Lesson:
     fit = _fit_of(found, names)
     return replace(
         taught,
-        mimics=len(names) if found.p_value >= FITS else 0,
+        mimics=len(names) if min(found.p_values) >= FITS else 0,
         mimicking=ways_of(clear.problem, found.baseline, fit) if fit else None,
     )
 

@@ -42,7 +42,7 @@ def attribution(
         explanations=causes,
         groups=(tuple(each.effect for each in causes),),
         invisible=(),
-        p_value=0.5,
+        p_values=(0.5, 1.0),
         search=SimpleNamespace(),  # type: ignore[arg-type]
         tried=(),
     )

@@ -191,6 +191,9 @@ def test_a_function_without_numbers_is_refused_with_a_remedy(
         (lambda: diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)]),
          "predicts no 'z'"),
         (lambda: diagnose_simulator(LINE, READINGS[:1]), "too few"),
+        (lambda: diagnose_simulator(LINE, READINGS, seed=-1), "seed is -1"),
+        (lambda: Reading({}, "y", "1"), "a reading holds '1', which is no number"),  # type: ignore[arg-type]
+        (lambda: Prior("normal", 0.0, "1"), "a prior holds '1'"),  # type: ignore[arg-type]
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_a_remedy(ask: Callable[[], object], said: str) -> None:

@@ -16,9 +16,10 @@ from shm.gap.causes.baseline import BEAMS
 from shm.inference import select
 from shm.models import build
 from shm.models.effects import Variant
+from shm.report.diagnosis_summary import write_lead
 from shm.simulate import PlantedEffect
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
-from shm.values.verdict import Outcome
+from shm.values.verdict import SHAPES_OFF, Outcome
 from tests.helpers.effects import all_but
 from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.helpers.gap_campaigns import PLANTED_CLAMP as CLAMP
@@ -92,6 +93,26 @@ def test_an_end_that_turns_is_placed_at_its_end() -> None:
     assert found.kind == "flexible end"
     assert found.x_m == found.low_m == found.high_m == 0.0
     assert found.share > 0.9
+
+
+def test_a_cause_that_moves_no_frequency_is_not_doubted_by_held_out_ones() -> None:
+    turn = PlantedEffect("sensor_misalignment", "sensor at 3.48 m", {"angle_deg": 12.0})
+    options = GapOptions("beam1", without=all_but(turn.name, "point_mass"))
+    found = diagnose(planted(turn), PLAIN, options)
+    assert found.leading is not None
+    assert found.leading.effect == turn.name
+    assert found.shrinkage.held_out_before_percent > 0
+    assert found.verdict.holds_out is None
+
+
+def test_shapes_that_are_off_by_more_than_they_state_are_said_to_be_what_is_left() -> None:
+    (test,) = planted(CLAMP)
+    points = [tuple(replace(p, sd=p.sd / 2) for p in mode.shape) for mode in test.modes]
+    modes = tuple(replace(m, shape=s) for m, s in zip(test.modes, points, strict=True))
+    found = diagnose([replace(test, modes=modes)], PLAIN, CLAMPS_ALONE)
+    assert found.verdict.outcome is Outcome.PARTLY
+    assert "mode shapes as far off would come by chance" in write_lead(found)
+    assert any(each.startswith(SHAPES_OFF) for each in found.remarks)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,7 +20,7 @@ from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, a_diagnosis
 from tests.helpers.entering import LINEAGE
 from tests.helpers.flows import Postman, ingest
-from tests.helpers.workspaces import START, write_test
+from tests.helpers.workspaces import START, make_workspace, write_test
 
 MASS_MODEL = "beam1+point_mass@everywhere"
 _UPDATE = quick_update.update
@@ -151,6 +152,14 @@ def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Wor
     assert made.adoption.diagnosis_id == stored.id
     both = adopted(begun, "effective_length", "sag")
     assert both.adoption.model == "beam2+effective_length@both_ends+sag@everywhere.transverse"
+
+
+def test_without_a_diagnosis_the_baseline_is_the_class_of_the_hanger(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "other", settings={"models": "beam2"})
+    spool(workspace, "t1")
+    ingest(workspace)
+    made = adopted(workspace, "point_mass").adoption
+    assert (made.baseline_model, made.diagnosis_id) == ("beam2", None)
 
 
 @pytest.mark.slow

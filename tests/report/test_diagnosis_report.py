@@ -114,7 +114,7 @@ def said(diagnosis: Diagnosis) -> str:
         (DOUBTED, "not to be relied on while it may be another hanger"),
         # A gap that shrinks only where it was fitted.
         (replace(LED, shrinkage=Shrinkage(2.3, 0.2, 2.5, 2.6)), "do not rely on the cause yet"),
-        (replace(LED, shrinkage=Shrinkage(2.3, 0.2, NAN, NAN)), "Nothing was held out of the fit"),
+        (replace(LED, shrinkage=Shrinkage(2.3, 0.2, NAN, NAN)), "that the cause moves was held"),
         (replace(LED, next_measurements=(POOR,)),
          "No measurement that was considered would tell point mass from no gap"),
         (replace(LED, next_measurements=(POOR, replace(POOR, expected_log_bayes_factor=1.2))),

@@ -155,7 +155,7 @@ def test_gap_map_shows_residuals_and_what_the_cause_leaves(figures: Figures) -> 
     assert {"with the cause", "with the cause, held out"} <= names
     unheld = tuple(replace(r, held_out_after_percent=float("nan")) for r in LED.where)
     item = drawn(OF_DIAGNOSIS, DiagnosisSheet(replace(LED, where=unheld), HANGER))[1]
-    assert "nothing was held out" in item.caption
+    assert "nothing that it moves was held out" in item.caption
     item = figures["blunder"]["gap_map"]
     axes = item.figure.axes[0]
     (cross,) = [line for line in axes.lines if line.get_marker() == "X"]

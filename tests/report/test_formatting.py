@@ -35,7 +35,8 @@ WIDE = Interval(469.3e3, 317.2e3, 711.4e3)
         (formatting.decimals(0.0), 1),
         # A probability pretends no certainty.
         *((formatting.probability(value), words) for value, words in (
-            (0.5, "0.50"), (0.99999, "> 0.99"), (1e-9, "< 0.01"), (math.nan, "not known"))),
+            (0.5, "0.50"), (0.99999, "> 0.99"), (1e-9, "< 0.01"), (0.006, "< 0.01"),
+            (math.nan, "not known"))),
         *((formatting.spoken_probability(value), words) for value, words in (
             (0.99999, "above 0.99"), (0.5, "0.50"), (1e-9, "below 0.01"))),
         (formatting.number(math.nan, ".3f"), "not known"),

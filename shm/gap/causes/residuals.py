@@ -171,15 +171,16 @@ def _centred(values: FloatArray, groups: IntArray, weight: FloatArray) -> FloatA
     return centred
 
 
-def predictive_p_value(
+def predictive_p_values(
     observations: Observations, predicted: FloatArray, noise: Covariance
-) -> float:
-    """Return the posterior predictive p-value (Gelman, Meng and Stern, Stat. Sinica 6, 1996).
+) -> tuple[float, float]:
+    """Return the posterior predictive p-values of frequencies and of shapes.
 
-    `predicted` (draws, data) are those of draws of the posterior, `noise` is the covariance that
-    the data should have about a right prediction. Three misfits are looked at, each a chi-square:
-    of all frequencies, of each mode's mean frequency over the tests (a gap that repeats drowns in
-    the first) and of the shapes. The smallest p-value is returned, times their number.
+    Gelman, Meng and Stern, Stat. Sinica 6, 1996. `predicted` (draws, data) are those of draws of
+    the posterior, `noise` is the covariance that the data should have about a right prediction.
+    Three misfits are looked at, each a chi-square: of all frequencies, of each mode's mean
+    frequency over the tests (a gap that repeats drowns in the first), of which the smaller p-value
+    counts, and of the shapes. Each is times the number of misfits; without shapes theirs is 1.
     """
     residual = observations.value - predicted
     count = observations.design.frequencies
@@ -190,7 +191,8 @@ def predictive_p_value(
     if noise.shape.size:
         distance = ShapeErrors([noise]).squares(residual[:, count:])[:, 0]
         misfits.append(float(np.mean(scipy.stats.chi2.sf(distance, _freedom(observations.design)))))
-    return min(1.0, len(misfits) * min(misfits))
+    of_frequencies, of_shapes = min(misfits[:2]), min(misfits[2:], default=1.0)
+    return min(1.0, len(misfits) * of_frequencies), min(1.0, len(misfits) * of_shapes)
 
 
 def predictions(problem: GapProblem, fit: Fit) -> FloatArray:
@@ -226,7 +228,7 @@ _ORDER_FOLDS, _TEST_FOLDS = 3, 6
 class HeldOut:
     """Residuals of held-out frequencies, of their logarithms: `before`, `after` (folds, F).
 
-    NaN where a fold keeps the frequency in the fit; `after` is NaN where there is no cause.
+    NaN where a fold keeps the frequency in the fit; `after` is NaN where no cause moves it.
     """
 
     before: FloatArray
@@ -242,17 +244,19 @@ def held_out(
     lowest and the highest in three folds, then tests in turn. A held-out frequency takes its shape
     with it. Tests are held out as long as the others still vary every condition that they all vary,
     and unless the cause acts in that test alone: else its size would be asked of data that cannot
-    know it. With three frequencies or fewer nothing can be held out, and all is NaN. Slopes and the
-    sizes of unknown errors are those of the full fits.
+    know it. With three frequencies or fewer nothing can be held out, and all is NaN; so is `after`
+    of a cause that moves no frequency, such as a turned sensor. Slopes and the sizes of unknown
+    errors are those of the full fits.
 
     Raises UsageError for names that are neither, or that leave too little to fit.
     """
     design = problem.observations.design
     folds = _named(design, hold_out) if hold_out else _in_turn(design, after)
     none = np.full((len(folds), design.frequencies), NAN)
+    moves = after is not None and after.slopes[: design.frequencies, len(before.z) :].any()
     return HeldOut(
         _residuals(problem, before, folds) if len(folds) else none,
-        none if after is None or not len(folds) else _residuals(problem, after, folds),
+        _residuals(problem, after, folds) if after and moves and len(folds) else none,
     )
 
 

@@ -23,7 +23,7 @@ from shm.gap.causes.probabilities import (
     log_prior,
     probabilities,
 )
-from shm.gap.causes.residuals import predictions, predictive_p_value
+from shm.gap.causes.residuals import predictions, predictive_p_values
 from shm.gap.causes.scan import scan, scan_pair
 from shm.gap.hypotheses.contract import Fit, GapOptions, Hypothesis
 from shm.gap.hypotheses.problem import GapProblem
@@ -376,8 +376,9 @@ class Attribution:
     """The causes of a gap as the evidence has them. All probabilities add to 1.
 
     `explanations` are the effects that were tried and the pairs that called for it, best first;
-    `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior
-    predictive p-value of the leading explanation that has no remainder. A part of
+    `unexplained` is the likeliest fit with a flexible remainder. `p_values` are the posterior
+    predictive p-values, of frequencies and of shapes, of the leading explanation that has no
+    remainder. A part of
     `unexplained_probability` is that of something unknown that passes for an effect of the
     catalogue. `invisible` names the effects that these data cannot show, and why.
     """
@@ -389,7 +390,7 @@ class Attribution:
     explanations: tuple[Explanation, ...]
     groups: tuple[tuple[str, ...], ...]
     invisible: tuple[tuple[str, str], ...]
-    p_value: float
+    p_values: tuple[float, float]
     search: Search
     tried: tuple[ScoredHypothesis, ...]
 
@@ -422,7 +423,7 @@ def attribute(
     tried = search.scored()
     kinds = families(tried, search.variants)
     most_probable = _fit([kind for kind in kinds if not kind.flexible])
-    p_value = predictive_p_value(
+    p_values = predictive_p_values(
         problem.observations, predictions(problem, most_probable), most_probable.noise
     )
     chances, mimic = probabilities(kinds)
@@ -438,7 +439,7 @@ def attribute(
         explanations=causes,
         groups=groups,
         invisible=search.invisible,
-        p_value=p_value,
+        p_values=p_values,
         search=search,
         tried=tuple(tried),
     )

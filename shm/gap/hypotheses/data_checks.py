@@ -137,12 +137,12 @@ def _without_temperature(tests: Sequence[ModalTest]) -> str:
 
 def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
     points = [point for test in tests for mode in test.modes for point in mode.shape]
-    missing = sum(math.isnan(point.sd) for point in points)
+    missing = sum(not point.sd > 0 for point in points)
     if not missing:
         return ""
     return (
-        f"{missing} of {len(points)} points of mode shapes have no standard deviation: their "
-        f"shapes are not used, and what only shapes show stays hidden."
+        f"{missing} of {len(points)} points of mode shapes have no standard deviation (0 is none): "
+        f"they are not used, and what only shapes show stays hidden."
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shm.errors import check_count
 from shm.gap.causes.groups import SAME_BELOW, group
 from shm.gap.causes.probabilities import (
     CALIBRATION,
@@ -180,6 +181,7 @@ def diagnose_simulator(
     >>> spring = shm.Simulator(lambda p, at: {"force_n": p["k"] * at["x_m"]}, {"k": prior})
     >>> shm.diagnose_simulator(spring, readings).summary()  # doctest: +SKIP
     """
+    check_count("seed", seed, 1, least=0)
     distinct, repeated = drop_copies(readings)
     problem = SimulatorProblem(simulator, distinct)
     rng = np.random.default_rng(seed)

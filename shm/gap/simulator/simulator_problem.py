@@ -50,6 +50,7 @@ class Prior:
     b: float
 
     def __post_init__(self) -> None:
+        _check_numbers("a prior", self.a, self.b)
         rises = self.a < self.b if self.spread in ("uniform", "logarithmic") else self.b > 0
         positive = self.a > 0 or self.spread in ("uniform", "normal")
         if not (rises and positive):
@@ -79,6 +80,9 @@ class Reading:
     observable: str
     value: float
     sd: float = float("nan")
+
+    def __post_init__(self) -> None:
+        _check_numbers("a reading", self.value, self.sd, *self.condition.values())
 
 
 @dataclass(frozen=True)
@@ -304,6 +308,16 @@ class SimulatorProblem:
         stated = set.intersection(*(set(each.condition) for each in self.readings))
         values = [np.array([each.condition[n] for each in self.readings]) for n in sorted(stated)]
         return [(each - each.min()) / np.ptp(each) for each in values if np.ptp(each) > 0]
+
+
+def _check_numbers(what: str, *given: object) -> None:
+    """Raise UsageError if one of `given` is no real number."""
+    for each in given:
+        if np.asarray(each).dtype.kind not in "biuf":
+            raise UsageError(
+                f"{what} holds {each!r}, which is no number.",
+                remedy="Write numbers without quotes; an unknown sd is NaN.",
+            )
 
 
 def _node(covariance: FloatArray, log_weight: float) -> NoiseNode:

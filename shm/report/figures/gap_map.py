@@ -193,7 +193,7 @@ def _caption_of_cause(sheet: DiagnosisSheet) -> str:
     held_out = (
         "open: the same where the mode or its test was held out of the fit"
         if _known(retained(sheet), "held_out_after_percent")
-        else "nothing was held out of the fit"
+        else "nothing that it moves was held out of the fit"
     )
     return f" Green diamonds: what {label(claim.leading)} leaves, means over the tests; {held_out}."
 
