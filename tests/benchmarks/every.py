@@ -68,7 +68,7 @@ SHORT = {
     "tension_coverage": "--cases 2",
     "validate": "--table A.6",
     "watch_ablation": "--only everything --world network --scenarios step5 --bridges 1",
-    "wrong_diameter": "--hangers 1",
+    "round_bars": "--seeds 100:101", "wrong_diameter": "--hangers 1",
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
     "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",
 }  # fmt: skip

@@ -166,9 +166,9 @@ def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, Float
 
 
 def _factor_of_shapes(observations: Observations) -> float:
-    """The likeliest true over stated standard deviations of shapes, by their scatter between tests.
+    """Return the likeliest true over stated standard deviations of shapes.
 
-    As little is known of them as of those of frequencies.
+    By their scatter between tests; as little is known of them as of those of frequencies.
     """
     scatter, freedom = _between_tests(observations)
     precision = observations.assumed.stated_sd_log_sd.value**-2 + 2 * freedom
@@ -176,7 +176,7 @@ def _factor_of_shapes(observations: Observations) -> float:
 
 
 def _between_tests(observations: Observations) -> tuple[float, float]:
-    """The scatter of shapes about their means over tests, in stated sds, and its freedom.
+    """Return the scatter of shapes about their means over tests, in stated sds, and its freedom.
 
     Scatter beyond three standard deviations counts as three, lest a shape that changes from test to
     test pass for it. Tests of one added mass are compared.

@@ -175,7 +175,7 @@ def _tension_shifts(tests: Sequence[ModalTest], assumed: Assumptions) -> FloatAr
 
 
 def _components(index: int, mode: Mode) -> list[_Component]:
-    """The usable components of a mode's shape; none where fewer than two are left."""
+    """Return the usable components of a mode's shape; none where fewer than two are left."""
     plane = PLANES.index(mode.plane)
     both = [
         _Component(index, point.x_m, axis, value, point.sd)
@@ -187,7 +187,7 @@ def _components(index: int, mode: Mode) -> list[_Component]:
 
 
 def _with_errors(shape: list[_Component], error: float, axes: float) -> list[_Component]:
-    """A shape whose components err by a part of its length more than stated, each by itself.
+    """Return a shape whose components err by a part of its length more than stated, each by itself.
 
     Where all sensors have two axes its direction may be uncertain, by its `axes` (radians) or by
     noise.
@@ -208,13 +208,13 @@ def _with_errors(shape: list[_Component], error: float, axes: float) -> list[_Co
 
 
 def _swings(shape: FloatArray) -> FloatArray:
-    """How far each place (places,) of a shape (places, 2) swings, in whatever direction."""
+    """Return how far each place (places,) of a shape (places, 2) swings, in whatever direction."""
     direction = np.linalg.svd(shape)[2][0]
     return np.asarray(np.copysign(np.hypot(*shape.T), shape @ direction))
 
 
 def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
-    """The standard deviation (modes,) of the direction in which each mode swings, in radians.
+    """Return the standard deviation (modes,), in radians, of the direction of each mode.
 
     A round bar swings in the planes of its supports only as far as these tell the planes apart:
     what couples them turns a pair of modes by its share of their distance (first order of
@@ -263,7 +263,7 @@ def _refuse_nonsense(tests: Sequence[ModalTest]) -> None:
 
 
 def _merged(places_m: Sequence[float]) -> tuple[float, ...]:
-    """The distinct places, sorted; those within a millimetre count as one."""
+    """Return the distinct places, sorted; those within a millimetre count as one."""
     merged: list[float] = []
     for x_m in sorted(places_m):
         if not merged or x_m - merged[-1] > _SAME_PLACE_M:

@@ -74,10 +74,11 @@ class Repeated:
 
 
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:
-    """Loads (F, k) of a section that varies along the bar about its mean and is not quite round.
+    """Return loads (F, k) of a section that varies along the bar and is not quite round.
 
-    `physical` holds `STRETCHES + 2` hangers alike. Mass goes with the section, bending stiffness
-    with its square; what one plane gains by a section that is not round, the other loses.
+    It varies about its mean. `physical` holds `STRETCHES + 2` hangers alike. Mass goes with the
+    section, bending stiffness with its square; what one plane gains by a section that is not round,
+    the other loses.
     """
     edges_m = np.linspace(0.0, hanger.length_m, STRETCHES + 1)
     influence = _influence(physical, edges_m, int(design.frequency_order.max()))
@@ -106,7 +107,7 @@ def section_ways(length_m: float, sd: float, reach_m: float) -> FloatArray:
 
 
 def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> FloatArray:
-    """Change (planes, orders, stretches + 1) of log frequencies by the section of each stretch.
+    """Return changes (planes, orders, stretches + 1) of log frequencies by each stretch's section.
 
     The last is that by the bending stiffness of the whole bar.
     """
@@ -241,7 +242,7 @@ class ShapeScaling:
 
 
 def turn_loads(observations: Observations) -> FloatArray:
-    """Loads (S, k) of the turns of modes whose direction is uncertain, two for each.
+    """Return loads (S, k) of the turns of modes whose direction is uncertain, two for each.
 
     A mode that swings in its plane gains across it by the turn, and loses along it by turn^2 / 2,
     whose root mean square is sqrt(3) / 2 times the turn's variance.
