@@ -200,7 +200,8 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
         return replace(found, reason="sampler failed")
     if left:
         is_worth_naming = nearest.probability >= MIN_RUNNER_UP
-        if is_worth_naming and nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
+        is_strong = nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR
+        if is_worth_naming and is_strong and _explains_some(diagnosis, left):
             return _with_claim(found, Outcome.PARTLY, nearest, left)
         return _decline(diagnosis, found, nearest)
     if diagnosis.leading is None:
@@ -260,6 +261,13 @@ def _find_left(diagnosis: Diagnosis, found: GapVerdict) -> Reason:
     if not found.fit_p_value >= MIN_FIT_P_VALUE:
         return "poor fit"
     return "acts alone" if found.alone else ""
+
+
+def _explains_some(diagnosis: Diagnosis, left: Reason) -> bool:
+    """Return whether frequencies that are off come nearer with the leading cause."""
+    shrinkage = diagnosis.shrinkage
+    is_nearer = shrinkage.rms_after_percent < shrinkage.rms_before_percent
+    return is_nearer or left not in ("large residuals", "large misfit")
 
 
 def _doubt_no_gap(diagnosis: Diagnosis, found: GapVerdict) -> Reason:

@@ -51,6 +51,8 @@ STRONG = replace(LED, causes=(cause("point_mass", 0.3, bayes=300.0),), unexplain
         (leave(2.0, 0.01), Outcome.EXPLAINED, ""),
         (leave(2.01), Outcome.PARTLY, "large residuals"),
         (leave(30.0, 0.4), Outcome.PARTLY, "large residuals"),
+        (replace(leave(6.0), shrinkage=Shrinkage(0.113, 0.114, 0.14, 0.13)), Outcome.UNEXPLAINED,
+         "weak evidence"),  # frequencies come no nearer
         (leave(1.0, 0.009), Outcome.PARTLY, "poor fit"),
         (leave(NAN), Outcome.EXPLAINED, ""),  # of a former version: by the p-value alone
         (leave(NAN, 0.009), Outcome.PARTLY, "poor fit"),
