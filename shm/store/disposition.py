@@ -16,7 +16,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.alerts import TEST_DISCARDED, acknowledge, raise_alert, resolve
+from shm.store.alerts import acknowledge, raise_alert, resolve
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads, value_from, value_in
 from shm.store.database import Repository, insert
@@ -34,6 +34,7 @@ from shm.store.files import (
 from shm.store.journal import AGAIN, REFUSED, write
 from shm.store.rows import (
     Decision,
+    Ending,
     HeldTest,
     Hold,
     ReceivedFile,
@@ -474,10 +475,10 @@ class Dispositions(Repository):
             baseline_ids = of_baselines(connection, rows)
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
-            text = f"{TEST_DISCARDED} {who}" + (f": {why}" if why else "")
+            text = f"test discarded by {who}" + (f": {why}" if why else "")
             raised = sa.select(alerts.c.id).where(alerts.c.test_id.in_(ids))
             for alert_id in connection.scalars(raised).all():
-                resolve(connection, alert_id, who, text, at)
+                resolve(connection, alert_id, who, text, at, Ending.TEST_DISCARDED)
             again = _watch_again(connection, rows, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)
