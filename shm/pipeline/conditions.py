@@ -152,8 +152,8 @@ def _why_not_called(alert: Alert, found: Evidence) -> str:
 
 
 def _why_answered(alert: Alert, reported: Sequence[Alert]) -> str:
-    """Return why a notice on one test is answered: an alert since then reports what changed."""
-    if alert.kinds not in OF_ONE_TEST:
+    """Return why a notice of what may have changed is answered: an alert since then reports it."""
+    if alert.kinds not in (*OF_ONE_TEST, ("check the baseline",)):
         return ""
     since = (e for e in reported if set(e.kinds) & OF_CHANGES and e.time >= alert.time)
     answer = next(since, None)

@@ -173,13 +173,17 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     hold = latest_hold(connection, recording.id)
     if hold is None or not hold.is_out:
         return None
+    return None if connection.scalar(sa.select(last_refusal(recording.id))) == REFUSED else hold
+
+
+def last_refusal(recording_id: Any) -> sa.ScalarSelect[Any]:
+    """Select the last entry by which a recording is out: a refusal, or a person's decision."""
     refusals = sa.select(journal.c.kind).where(
-        journal.c.recording_id == recording.id,
+        journal.c.recording_id == recording_id,
         journal.c.subject != "",
         journal.c.kind.in_([REFUSED, Decision.DISCARDED, Decision.WITHDRAWN]),
     )
-    latest = connection.scalar(refusals.order_by(journal.c.id.desc()).limit(1))
-    return None if latest == REFUSED else hold
+    return refusals.order_by(journal.c.id.desc()).limit(1).scalar_subquery()
 
 
 def discarded_reason(hold: Hold) -> str:

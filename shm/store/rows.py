@@ -68,7 +68,7 @@ OTHER = "other"
 """Stands for whatever a row says that this version has no name for."""
 
 
-def sum_counts(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+def sum_counts(known: Iterable[str], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
     """Sum the counts in pairs of a name and a count; unknown names are summed under `OTHER`.
 
     Each name of `known` is counted, 0 where there is none.
