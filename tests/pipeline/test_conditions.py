@@ -12,7 +12,7 @@ from shm.pipeline.conditions import Evidence, conditions_of
 from shm.pipeline.reconcile import SHM, reconcile
 from shm.store import StoredAlert
 from shm.store.rows import AlertNote, Ending
-from shm.values import Alert, WatchedTest
+from shm.values import Alert, AlertKind, WatchedTest
 from tests.helpers.nouns import NOW, a_drift, a_watched_test, an_alert
 from tests.watch.test_agreement import HANGER
 
@@ -144,3 +144,25 @@ def test_what_the_alert_of_a_discarded_test_reported_other_tests_report() -> Non
     back = again(tests, [ended, alone])
     assert is_open(back) == [False, False, True]
     assert back[2].alert.key == "loss:t2:again-1"
+
+
+@pytest.mark.parametrize("kind", ["repeat the test", "tests disagree", "check the baseline"])
+@pytest.mark.parametrize(("raised", "expected"), [("t1", False), ("t3", True)])
+def test_an_alert_of_a_change_answers_notices_of_before(
+    kind: AlertKind, raised: str, expected: bool
+) -> None:
+    tests = weekly(SOUND, LOST, LOST, LOST)
+    at = next(test.time for test in tests if test.test == raised)
+    notice = replace(an_alert("notice", raised), time=at, kinds=(kind,), drifts=())
+    known = in_order(tests, [StoredAlert(1, notice, at, baseline_id=1)])
+    assert is_open(known) == [expected, True]
+
+
+def test_an_alert_that_two_visits_renewed_ends_where_no_call_holds() -> None:
+    """Of a loss that was restored most tests are discarded; they count again afterwards."""
+    tests = weekly(SOUND, LOST, LOST, SOUND, SOUND, LOST, LOST)
+    known = in_order(tests, [])
+    assert is_open(known) == [False, True]
+    left = [*tests[:5], *(replace(t, drifts=tests[4].drifts) for t in tests[5:])]
+    ended = decide(known, left, "t6", list(calls_of(left).values()), is_again=True)
+    assert is_open(ended) == [False, False]
