@@ -135,8 +135,18 @@ def is_workspace() -> bool:
 def opened_store() -> Iterator[tuple[Workspace, Store]]:
     """Return the workspace of the command and its store, open."""
     workspace = open_workspace()
-    with workspace.store() as store:
+    with readable_store(workspace) as store:
         yield workspace, store
+
+
+@contextmanager
+def readable_store(workspace: Workspace) -> Iterator[Store]:
+    """Return the open store; on a full disk a copy to read, which is said first."""
+    with workspace.store(or_copy=True) as store:
+        if store.copied:
+            text = f"Nothing can be written: {store.copied} What follows is read from a copy."
+            click.echo(paragraph(text), err=True)
+        yield store
 
 
 def one_hanger(hanger_file: Path | None, hanger_id: int | None) -> Hanger:

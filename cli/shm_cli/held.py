@@ -20,12 +20,12 @@ from shm.store.disposition import discarded_reason, taking_back
 from shm.store.journal import list_former_tests
 from shm.store.recordings import find_latest_hold, find_recording, list_holds
 from shm_cli import flags
-from shm_cli.common import can_ask, paragraph, show
+from shm_cli.common import can_ask, paragraph, readable_store, show
 
 
 def show_held(workspace: Workspace) -> int:
     """List the recordings that wait for a decision."""
-    with workspace.store() as store:
+    with readable_store(workspace) as store:
         found = list_holds(store)
     if flags.wants_json():
         show({"held": [hold_document(hold) for hold in found]}, "held")

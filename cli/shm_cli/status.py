@@ -25,7 +25,7 @@ from shm.report.formatting import Interval, with_half
 from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
-from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
+from shm.store import Decision, DeliveryState, Store, Workspace
 from shm.store.alerts import count_deliveries, count_raised, describe_silence
 from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.point_outbox import PointOutbox
@@ -35,6 +35,7 @@ from shm.store.recordings import (
     find_recording,
     list_holds,
 )
+from shm.store.rows import ON_THE_WAY
 from shm.store.tests import list_baseline_tests
 from shm.store.watch import (
     list_adoptions,
@@ -220,7 +221,6 @@ def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     counts, deliveries = count_stages(store), count_deliveries(store)
-    ended = sum(counts[stage] for stage in ENDED)
     held, now = list_holds(store), utc_now()
     state = HangersNow(workspace, store, workspace.bridge.hangers, now)
     open_at = Counter(state.open_alerts)
@@ -231,7 +231,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
         "recordings": counts,
-        "under_way": sum(counts.values()) - ended,
+        "under_way": sum(counts[stage] for stage in ON_THE_WAY),
         "oldest_waiting_at": find_oldest_waiting(store),
         "spool": len(scan(workspace.spool)),
         "never_taken": [

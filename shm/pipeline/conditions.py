@@ -17,20 +17,18 @@ from shm.pipeline.reconcile import (
     OF_CHANGES,
     OF_ONE_TEST,
     REPEAT,
-    SHM,
     Condition,
     is_reported,
     subjects_of,
     with_free_key,
 )
 from shm.store import StoredAlert
-from shm.store.alerts import TEST_DISCARDED
+from shm.store.rows import Ending
 from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 
 _HALF = 0.5  # judgement: of a shift, so much must be left of it
 _ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothing of a shift
-_JUDGED_AGAIN = "judged again with the thresholds in force"
 
 ShowsGap = Callable[[WatchedTest], bool]
 """Whether the gap of an adopted class is still larger at a test than when it was adopted."""
@@ -63,14 +61,34 @@ def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condi
     ended = [each for each in known if each.resolution]
     # What other thresholds or a discarded test have closed may be called for again, as if it had
     # never been raised.
-    undone = (_JUDGED_AGAIN, TEST_DISCARDED)
-    past = [e for e in ended if e.resolution and not e.resolution.why.startswith(undone)]
+    undone = (Ending.JUDGED_AGAIN, Ending.TEST_DISCARDED)
+    past = [e for e in ended if e.resolution and e.resolution.ending not in undone]
+    called = list(_called_for(found, ended, past))
+    yield from called
     is_open: set[tuple[str, float]] = set()
-    for alert in (each.alert for each in known if not each.resolution):
-        if why := why_over(alert, found) or _why_not_called(alert, found):
+    unended = [each.alert for each in known if not each.resolution]
+    reported = [*unended, *(each.alert for each in called)]
+    for alert in unended:
+        if why := why_over(alert, found) or _why_answered(alert, reported):
             yield Condition(alert, "over", why)
+        elif why := _why_not_called(alert, found):
+            yield Condition(alert, "over", why, Ending.JUDGED_AGAIN)
         else:
             is_open |= subjects_of(alert)
+    for each in reversed(past):
+        subjects = subjects_of(each.alert)
+        if not subjects <= is_open:
+            is_open |= subjects
+            later = [test for test in found.tests if test.time > _judged_until(each)]
+            shown = _last_agreeing(each.alert, found, later, is_shown=True)
+            if len(shown) > 1:
+                yield Condition(_renewed(each, shown, found.hanger), "holds")
+
+
+def _called_for(
+    found: Evidence, ended: Sequence[StoredAlert], past: Sequence[StoredAlert]
+) -> Iterator[Condition]:
+    """Return what the tests call for and no alert of the `past` has reported."""
     for alert in found.called:
         is_change = bool(set(alert.kinds) & OF_CHANGES)
         is_past = is_reported(alert, [e.alert for e in past if alert.time <= _judged_until(e)])
@@ -80,13 +98,6 @@ def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condi
             text = f"{alert.message} Raised when the stored tests were judged again."
             alert = replace(alert, message=text)
         yield Condition(with_free_key(alert, ended), "holds")
-    for each in reversed(past):
-        subjects = subjects_of(each.alert)
-        if not subjects <= is_open:
-            is_open |= subjects
-            shown = _last_agreeing(each.alert, found, _judged_until(each), is_shown=True)
-            if len(shown) > 1:
-                yield Condition(_renewed(each, shown, found.hanger), "holds")
 
 
 def _judged_until(stored: StoredAlert) -> datetime:
@@ -95,18 +106,23 @@ def _judged_until(stored: StoredAlert) -> datetime:
     A person who resolves one knows the tests until then.
     """
     end = stored.resolution
-    return stored.alert.time if end is None or end.who == SHM else end.at
+    return end.at if end and end.ending is Ending.BY_PERSON else stored.alert.time
 
 
 def why_over(alert: Alert, found: Evidence) -> str:
     """Return why the condition of an alert has ended; empty while it holds or is unknown.
 
-    It ends with two visits that agree; a notice on one test with one that agrees with those before
-    it and does not clearly read beyond a threshold.
+    It ends with two visits that agree, or with a further change since, which rests on two; a notice
+    on one test with one that agrees with those before it and does not clearly read beyond a
+    threshold.
     """
-    gone = _last_agreeing(alert, found, alert.time, is_shown=False)
+    # Its own test speaks, too: judged again it may agree with one that came late or counts again.
+    since = [test for test in found.tests if test.time >= alert.time]
+    gone = _last_agreeing(alert, found, since, is_shown=False)
     if gone and alert.kinds == REPEAT:
         return f"test {gone[-1].test} agrees with those before it"
+    if gone and (further := gone[-1].change).called and further.began_by > alert.time:
+        return f"test {gone[-1].test}, which shows a further change, does not show it any more"
     if len(gone) < 2:
         return ""
     both = f"tests {gone[0].test} and {gone[1].test}, of two visits,"
@@ -122,26 +138,38 @@ def why_over(alert: Alert, found: Evidence) -> str:
 def _why_not_called(alert: Alert, found: Evidence) -> str:
     """Return why tests that are done again do not call for an open alert; empty where they do."""
     kinds, limits = set(alert.kinds), found.hanger.thresholds
+    if not found.is_again or not kinds <= OF_CHANGES:
+        return ""
     same = [each for each in found.called if set(each.kinds) & OF_CHANGES == kinds]
-    if not found.is_again or not kinds <= OF_CHANGES or is_reported(alert, same):
+    if is_reported(alert, [each for each in same if not why_over(each, found)]):
         return ""
     return (
-        f"{_JUDGED_AGAIN} (tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
+        "judged again with the thresholds in force "
+        f"(tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
         f"{limits.stiffness_shift_decades:.3g} decades, probability "
         f"{limits.alert_probability:.3g}): its tests do not call for it as it was told"
     )
 
 
+def _why_answered(alert: Alert, reported: Sequence[Alert]) -> str:
+    """Return why a notice of what may have changed is answered: an alert since then reports it."""
+    if alert.kinds not in (*OF_ONE_TEST, ("check the baseline",)):
+        return ""
+    since = (e for e in reported if set(e.kinds) & OF_CHANGES and e.time >= alert.time)
+    answer = next(since, None)
+    return f"the alert of test {answer.test} reports what has changed" if answer else ""
+
+
 def _last_agreeing(
-    alert: Alert, found: Evidence, since: datetime, *, is_shown: bool
+    alert: Alert, found: Evidence, tests: Sequence[WatchedTest], *, is_shown: bool
 ) -> tuple[WatchedTest, ...]:
-    """Return the last test and one of a visit before, if no test from there on disagrees.
+    """Return the last of `tests` and one of a visit before, if no test from there on disagrees.
 
     They agree that what was reported is there, or that it is gone. The last test is returned alone
     where it has no such partner, nothing where the last one disagrees.
     """
     thresholds, last = found.hanger.thresholds, None
-    for test in reversed([each for each in found.tests if each.time > since]):
+    for test in reversed(tests):
         left = _left(alert, test, found)
         is_there = left >= thresholds.alert_probability
         if not (is_there if is_shown else left < thresholds.end_probability):

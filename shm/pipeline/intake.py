@@ -99,7 +99,7 @@ def _keep(
             made = archive.keep(made_up, most_bytes=most, on_progress=on_progress)
         archived_sidecar = replace(made, entry=archived_sidecar.entry) if archived_sidecar else made
     return archived_sidecar, archive.keep(
-        path, follow=follow, most_bytes=most, on_progress=on_progress
+        path, follow=follow, most_bytes=most, on_progress=on_progress, under_any_suffix=True
     )
 
 

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from math import isclose, isfinite, isnan
 
-from shm.pipeline.reconcile import SHM, Condition, reconcile
+from shm.pipeline.reconcile import Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
 from shm.store.posteriors import find_latest_trends, list_trend
-from shm.store.rows import TrendPoint
+from shm.store.rows import Ending, TrendPoint
 from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 
 _KIND: AlertKind = "limit"
@@ -111,7 +111,7 @@ def _is_another_crossing(store: Store, hanger: Hanger, last: StoredAlert) -> boo
     it was beyond its limit is not told again."""
     if last.resolution is None:
         return False
-    if last.resolution.who == SHM:
+    if last.resolution.ending is not Ending.BY_PERSON:
         return True
     side, end = _side(last.alert), hanger.thresholds.end_probability
     since = list_trend(store, hanger, last.alert.time)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from shm.store import Reconciled, StoredAlert
+from shm.store.rows import Ending
 from shm.values import Alert, AlertKind, Change, Drift, Moved
 
 SHM = "shm"
@@ -27,7 +28,7 @@ _SDS = 2.0  # by which two measurements of one change differ once in twenty time
 
 @dataclass(frozen=True)
 class Condition:
-    """State of what an alert reports, and the reason where it is over.
+    """State of what an alert reports; where it is over, how it ended and why.
 
     An unknown one opens and closes nothing. `baseline_id` is that of the tests that show it, None
     for other conditions.
@@ -36,12 +37,13 @@ class Condition:
     alert: Alert
     state: State
     why: str = ""
+    ending: Ending = Ending.OVER
     baseline_id: int | None = None
 
 
 def reconcile(open_alerts: Iterable[StoredAlert], conditions: Sequence[Condition]) -> Reconciled:
     """Close open alerts whose condition is over; open what holds and no open alert reports."""
-    over = {each.alert.key: each.why for each in conditions if each.state == "over"}
+    over = {e.alert.key: (e.ending, e.why) for e in conditions if e.state == "over"}
     is_open = list(open_alerts)
     to_close = {each.id: over[each.alert.key] for each in is_open if each.alert.key in over}
     left = [each for each in is_open if each.id not in to_close]

@@ -55,7 +55,8 @@ class Evidence:
     """Misfits `off` (2, orders) of ln f and what may be behind them.
 
     `sensitivity` (2, orders, 8); `changes` are weights with standard deviations (8,), `errors`
-    weights with a standard deviation of each mode; `masses`: something may have been hung on it.
+    weights with a standard deviation of each mode; `masses`: something may have been hung on it;
+    `restored`: the same against its baseline, as often as a tension is lost or restored.
     """
 
     off: Seen
@@ -63,6 +64,7 @@ class Evidence:
     changes: tuple[tuple[float, FloatArray], ...]
     errors: tuple[tuple[float, float], ...] = LIMITS.test_errors
     masses: bool = False
+    restored: Evidence | None = None
 
     @property
     def mask(self) -> BoolArray:
@@ -80,6 +82,9 @@ class Evidence:
         found = _log_normal(off, covariance) + np.log(np.outer(weights, shares)).ravel()
         if self.masses:
             found = np.append(found, self._with_mass(mask))
+        if self.restored is not None and not (mask & ~self.restored.mask).any():
+            back = self.restored.log_density(mask) + math.log(TIGHTER[0])
+            found = np.append(found, back)
         return log_sum(found)
 
     def _error_correlation(self, mask: BoolArray) -> FloatArray:

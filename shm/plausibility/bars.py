@@ -1,11 +1,12 @@
 """Check by Bayes' rule that a test is of its hanger: "right hanger?", "right sampling rate?".
 
-It is that hanger, as it was or really changed; another hanger, or a bar that nobody described; the
-time base is wrong; or the planes are exchanged. The shift of ln f (modes,) since the hanger's
-earlier tests, or from its description, is normal about 0 with covariance S + J C J': J (modes, 8)
-is how the fitted bar goes with its parameters and the time base, C the variances of what may
-change, S what tests and the bar model err by. Two candidates are compared by the modes of which
-both speak. Twins cannot be told apart before the named one has a test of its own.
+It is that hanger, as it was of late or at its baseline, or really changed; another hanger, or a bar
+that nobody described; the time base is wrong; or the planes are exchanged. The shift of ln f
+(modes,) since the hanger's earlier tests, or from its description, is normal about 0 with
+covariance S + J C J': J (modes, 8) is how the fitted bar goes with its parameters and the time
+base, C the variances of what may change, S what tests and the bar model err by. Two candidates are
+compared by the modes of which both speak. Twins cannot be told apart before the named one has a
+test of its own.
 """
 
 from __future__ import annotations
@@ -40,10 +41,11 @@ COARSE_FACTORS = tuple(factor for factor in LIMITS.factors if abs(math.log(facto
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A hanger as described, and its accepted tests, oldest first (none: `()`)."""
+    """A hanger as described, its accepted tests, oldest first (none: `()`), and its baseline's."""
 
     hanger: Hanger
     tests: tuple[ModalTest, ...] = ()
+    baseline: tuple[ModalTest, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,11 @@ def _candidates(
         rivals[Origin("time base", factor=factor)] = _as_before(shift, way, OTHER_CLOCK)
     crossed = seen.over(before[id_].exchanged())
     rivals[Origin("planes")] = _as_before(crossed, way[::-1])
-    return weigh_change(mine, shift), _with_priors(rivals, len(others))
+    now_or_then = weigh_change(mine, shift)
+    if history.baseline:
+        restored = _as_before(seen.over(seen_in(history.baseline, history.hanger)), way)
+        now_or_then = replace(now_or_then, restored=restored)
+    return now_or_then, _with_priors(rivals, len(others))
 
 
 def _with_priors(
@@ -216,7 +222,7 @@ _ACTIONS = {
 
 def of_another_bar(candidate: Candidate) -> Doubt | None:
     """Modes of another hanger, of a wrong time base or of exchanged planes."""
-    its = Known(candidate.hanger, tuple(candidate.earlier))
+    its = Known(candidate.hanger, tuple(candidate.earlier), tuple(candidate.reference))
     others = [Known(hanger, tuple(tests)) for hanger, tests in candidate.others]
     found = doubt_of(candidate.test, its, others)
     if found is None or found.kind == "unknown bar":

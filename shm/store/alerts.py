@@ -22,6 +22,7 @@ from shm.store.rows import (
     AlertNote,
     Delivery,
     DeliveryState,
+    Ending,
     EventKind,
     HangerEvent,
     News,
@@ -35,10 +36,6 @@ from shm.store.tables import adoptions, alerts, baselines, deliveries, silences,
 from shm.values import Alert
 
 stored_alerts = sa.select(alerts)
-
-
-TEST_DISCARDED = "test discarded by"
-"""Begins why an alert ended whose test counts no more: what its condition is, other tests say."""
 
 
 def raise_alert(
@@ -78,8 +75,8 @@ def settle(
 
     With a `test` they are against a baseline, and each belongs to the test that it names.
     """
-    for alert_id, why in changes.to_close.items():
-        resolve(connection, alert_id, "shm", why, at)
+    for alert_id, (ending, why) in changes.to_close.items():
+        resolve(connection, alert_id, "shm", why, at, ending)
     raised = []
     for alert in changes.to_open:
         test_id = None
@@ -91,12 +88,19 @@ def settle(
     return tuple(each for each in raised if each is not None)
 
 
-def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
+def resolve(
+    connection: Connection,
+    alert_id: int,
+    who: str,
+    why: str,
+    at: datetime,
+    ending: Ending = Ending.BY_PERSON,
+) -> bool:
     """Notes that the condition of an alert ended; False where that is noted already.
 
     Each hook that was told of the alert is owed that news.
     """
-    if not _note_on(connection, alert_id, "ended", who, why, at):
+    if not _note_on(connection, alert_id, "ended", who, why, at, kind=ending):
         return False
     notified = sa.select(deliveries.c.hook).where(
         deliveries.c.alert_id == alert_id,
@@ -114,9 +118,16 @@ def acknowledge(connection: Connection, alert_id: int, who: str, why: str, at: d
 
 
 def _note_on(
-    connection: Connection, alert_id: int, prefix: str, who: str, why: str, at: datetime
+    connection: Connection,
+    alert_id: int,
+    prefix: str,
+    who: str,
+    why: str,
+    at: datetime,
+    **more: Ending,
 ) -> bool:
-    note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
+    values = {"at": at, "who": who, "why": why, **more}
+    note = {f"{prefix}_{name}": value for name, value in values.items()}
     return bool(connection.execute(_ONCE[prefix], {"alert": alert_id, **note}).rowcount)
 
 
@@ -155,7 +166,9 @@ def _owed(alert_id: int, hook: str, news: News, at: datetime) -> dict[str, Any]:
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert with its acknowledgement and resolution, of a row of `stored_alerts`."""
     noted = row.noted_at and AlertNote(row.id, row.noted_who, row.noted_why, row.noted_at)
-    ended = row.ended_at and AlertNote(row.id, row.ended_who, row.ended_why, row.ended_at)
+    ended = row.ended_at and AlertNote(
+        row.id, row.ended_who, row.ended_why, row.ended_at, Ending(row.ended_kind)
+    )
     return StoredAlert(row.id, row.document, row.raised_at, noted, ended, row.baseline_id)
 
 

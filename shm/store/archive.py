@@ -118,9 +118,11 @@ class Archive:
         follow: bool = False,
         most_bytes: float = math.inf,
         on_progress: ProgressCallback = do_nothing,
+        under_any_suffix: bool = False,
     ) -> ArchivedFile:
         """Copies a file in under its checksum; bytes that are there already are left alone.
 
+        So are those that are there `under_any_suffix`, if asked: the suffix tells nobody anything.
         Where those have rotted, which their name tells, the good ones take their place.
         Raises TooLarge before a byte of a file of more than `most_bytes` is read.
 
@@ -141,6 +143,9 @@ class Archive:
                     retry_after_s=1.0,
                 )
             relative = Path(sha256[:2]) / f"{sha256}{suffix_of(source.name)}"
+            if under_any_suffix and not (self.folder / relative).exists():
+                there = (self.folder / sha256[:2]).glob(f"{sha256}*")
+                relative = min((path.relative_to(self.folder) for path in there), default=relative)
             self._place(temporary, self.folder / relative)
         return ArchivedFile(sha256, size, relative.as_posix(), inode_identity(before))
 

@@ -7,12 +7,14 @@ What a database's errors mean, what to do, and when trying again may help.
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
@@ -227,6 +229,28 @@ def make_engine(location: str | Path, **options: Any) -> Engine:
     sa.event.listen(engine, "connect", configure)
     sa.event.listen(engine, "begin", begin)
     return engine
+
+
+def copy_engine(location: str | Path) -> Engine:
+    """Return the engine of a copy in memory of a database file, which nobody can write.
+
+    It needs no room on the disk, where SQLite else begins an index of its log; what is in the log
+    is copied. Raises StoreError.
+    """
+    url = url_of(location)
+    name = f"file:{uuid4().hex}?mode=memory&cache=shared"
+    copy = sqlite3.connect(name, uri=True, check_same_thread=False)
+    with translated(shown(url), sqlite3.Error), closing(sqlite3.connect(str(url.database))) as file:
+        file.execute("PRAGMA locking_mode = EXCLUSIVE")  # the index is in memory then
+        file.backup(copy)
+    return make_engine(location, creator=partial(_connect_to_copy, name, copy))
+
+
+def _connect_to_copy(name: str, _copy: sqlite3.Connection) -> sqlite3.Connection:
+    """Return one more connection; the copy lives as long as the first."""
+    connection = sqlite3.connect(name, uri=True, check_same_thread=False)
+    connection.execute("PRAGMA query_only = ON")
+    return connection
 
 
 def _options(url: sa.URL) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.alerts import TEST_DISCARDED, acknowledge, raise_alert, resolve
+from shm.store.alerts import acknowledge, raise_alert, resolve
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads, value_from, value_in
 from shm.store.database import Repository, insert
@@ -34,6 +34,7 @@ from shm.store.files import (
 from shm.store.journal import AGAIN, REFUSED, write
 from shm.store.rows import (
     Decision,
+    Ending,
     HeldTest,
     Hold,
     ReceivedFile,
@@ -172,13 +173,17 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     hold = latest_hold(connection, recording.id)
     if hold is None or not hold.is_out:
         return None
+    return None if connection.scalar(sa.select(last_refusal(recording.id))) == REFUSED else hold
+
+
+def last_refusal(recording_id: Any) -> sa.ScalarSelect[Any]:
+    """Select the last entry by which a recording is out: a refusal, or a person's decision."""
     refusals = sa.select(journal.c.kind).where(
-        journal.c.recording_id == recording.id,
+        journal.c.recording_id == recording_id,
         journal.c.subject != "",
         journal.c.kind.in_([REFUSED, Decision.DISCARDED, Decision.WITHDRAWN]),
     )
-    latest = connection.scalar(refusals.order_by(journal.c.id.desc()).limit(1))
-    return None if latest == REFUSED else hold
+    return refusals.order_by(journal.c.id.desc()).limit(1).scalar_subquery()
 
 
 def discarded_reason(hold: Hold) -> str:
@@ -474,10 +479,10 @@ class Dispositions(Repository):
             baseline_ids = of_baselines(connection, rows)
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
-            text = f"{TEST_DISCARDED} {who}" + (f": {why}" if why else "")
+            text = f"test discarded by {who}" + (f": {why}" if why else "")
             raised = sa.select(alerts.c.id).where(alerts.c.test_id.in_(ids))
             for alert_id in connection.scalars(raised).all():
-                resolve(connection, alert_id, who, text, at)
+                resolve(connection, alert_id, who, text, at, Ending.TEST_DISCARDED)
             again = _watch_again(connection, rows, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)

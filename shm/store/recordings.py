@@ -16,6 +16,7 @@ from shm.store.database import Repository, insert
 from shm.store.disposition import (
     Dispositions,
     hold_from,
+    last_refusal,
     latest_hold,
     redescribe,
     reopen,
@@ -36,6 +37,7 @@ from shm.store.rows import (
     ENDED,
     ON_THE_WAY,
     Deaths,
+    Decision,
     Hold,
     Outcome,
     Receipt,
@@ -239,11 +241,13 @@ def find_oldest_waiting(store: Repository) -> datetime | None:
 
 
 def count_stages(store: Repository) -> dict[str, int]:
-    """Count the recordings at each stage; see `sum_counts`."""
-    query = sa.select(sa.type_coerce(recordings.c.stage, sa.Text), sa.func.count()).group_by(
-        recordings.c.stage
-    )
-    return sum_counts(Stage, store.rows(query))
+    """Count the recordings at each stage, and apart those that a person discarded."""
+    decisions = (Decision.DISCARDED, Decision.WITHDRAWN)
+    is_out = (recordings.c.stage == Stage.REFUSED) & last_refusal(recordings.c.id).in_(decisions)
+    name = sa.type_coerce(recordings.c.stage, sa.Text)
+    stage = sa.case((is_out, str(Decision.DISCARDED)), else_=name)
+    query = sa.select(stage, sa.func.count()).select_from(recordings).group_by(sa.text("1"))
+    return sum_counts([*Stage, Decision.DISCARDED], store.rows(query))
 
 
 def list_stage_seconds(store: Repository, since: datetime) -> dict[str, list[float]]:

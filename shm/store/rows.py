@@ -68,7 +68,7 @@ OTHER = "other"
 """Stands for whatever a row says that this version has no name for."""
 
 
-def sum_counts(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+def sum_counts(known: Iterable[str], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
     """Sum the counts in pairs of a name and a count; unknown names are summed under `OTHER`.
 
     Each name of `known` is counted, 0 where there is none.
@@ -273,14 +273,28 @@ class WatchCheckpoint:
     content: bytes
 
 
+class Ending(StrEnum):
+    """How an alert ended, and with it what may be said of its condition."""
+
+    OVER = "over"  # its condition is
+    BY_PERSON = "by a person"  # who knows what was known by then
+    # Nobody has judged its condition: tests may call for it as if it had never been raised.
+    JUDGED_AGAIN = "judged again"  # with other thresholds
+    TEST_DISCARDED = "test discarded"
+
+
 @dataclass(frozen=True)
 class AlertNote:
-    """Note on an alert, made once: who has taken note of it, or found that its condition ended."""
+    """Note on an alert, made once: who has taken note of it, or found that its condition ended.
+
+    `ending` is None of an acknowledgement, which ends nothing.
+    """
 
     alert_id: int
     who: str
     why: str
     at: datetime
+    ending: Ending | None = None
 
     @property
     def as_document(self) -> dict[str, object]:
@@ -311,10 +325,10 @@ class StoredAlert:
 
 @dataclass(frozen=True)
 class Reconciled:
-    """Alerts to open, and the numbers of open ones to close, each with the reason."""
+    """Alerts to open, and the numbers of open ones to close, each with the reason in words."""
 
     to_open: tuple[Alert, ...] = ()
-    to_close: Mapping[int, str] = field(default_factory=dict)
+    to_close: Mapping[int, tuple[Ending, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

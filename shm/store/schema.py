@@ -15,7 +15,7 @@ from shm.resources import migrations_folder
 from shm.store.database import make_engine, reading, shown, writing
 from shm.store.tables import SCHEMA
 
-_RELEASED = ("0014", "0015")
+_RELEASED = ("0014", "0015", "0016")
 """Schemas besides the first that the one step to today's takes: of 1.0.0, and of what followed."""
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
 from sqlalchemy.engine import Engine
 
-from shm.errors import NothingThere
+from shm.errors import NothingThere, StoreError
 from shm.store import schema
 from shm.store.alerts import Alerts, Silences
 from shm.store.changed_settings import ChangedSettings
-from shm.store.database import Database, make_engine
+from shm.store.database import Database, copy_engine, is_server, make_engine
 from shm.store.journal import Actor, Journal, acting_as
 from shm.store.notes import Notes
 from shm.store.people import People
@@ -36,6 +37,8 @@ class Store(Database):
     `bridge.toml`; `upkeep` tokens, copies of raw files and backups.
     """
 
+    copied: str = ""
+
     def __init__(self, engine: Engine):
         super().__init__(engine)
         self.recordings = Recordings(engine)
@@ -52,25 +55,40 @@ class Store(Database):
         self.upkeep = Upkeep(engine)
 
     @classmethod
-    def open(cls, location: str | Path) -> Self:
-        """An existing store, by file or URL; raises NothingThere, SchemaOutdated or StoreError."""
+    def open(cls, location: str | Path, *, or_copy: bool = False) -> Self:
+        """An existing store, by file or URL; raises NothingThere, SchemaOutdated or StoreError.
+
+        For one who only reads `or_copy` opens a copy in memory where the disk is full; `copied`
+        says why.
+        """
         _must_exist(location)
-        return cls(_ready(location, schema.check))
+        try:
+            return cls(_ready(make_engine(location), schema.check))
+        except StoreError as error:
+            if not or_copy or type(error) is not StoreError or is_server(location):
+                raise
+            with suppress(StoreError):
+                store = cls(_ready(copy_engine(location), schema.check))
+                store.copied = error.message
+                return store
+            raise
 
     @classmethod
     def create(cls, location: str | Path) -> Self:
         """Makes the tables where there are none, and opens the store."""
-        return cls(_ready(location, schema.upgrade))
+        return cls(_ready(make_engine(location), schema.upgrade))
 
     @staticmethod
     def upgrade(location: str | Path) -> None:
         """Brings an existing store to the present schema."""
         _must_exist(location)
-        _ready(location, schema.upgrade).dispose()
+        _ready(make_engine(location), schema.upgrade).dispose()
 
     def acting_as(self, actor: Actor) -> Self:
         """The same open store, where changes are noted as an actor's; not to be closed."""
-        return type(self)(acting_as(self.engine, actor))
+        store = type(self)(acting_as(self.engine, actor))
+        store.copied = self.copied
+        return store
 
     def __enter__(self) -> Self:
         return self
@@ -88,9 +106,8 @@ def _must_exist(location: str | Path) -> None:
         )
 
 
-def _ready(location: str | Path, prepare: Callable[[Engine], None]) -> Engine:
+def _ready(engine: Engine, prepare: Callable[[Engine], None]) -> Engine:
     """The store's engine, once it is prepared; where that fails nothing stays open."""
-    engine = make_engine(location)
     try:
         prepare(engine)
     except BaseException:

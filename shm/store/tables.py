@@ -53,7 +53,7 @@ from shm.values import Alert, Drift, ForeignMode, QualityCheck
 from shm.values.notes import Note
 from shm.values.stream import StreamEvent
 
-SCHEMA = "0016"
+SCHEMA = "0017"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 _LINEAGE = {
@@ -251,6 +251,7 @@ alerts = sa.Table(
     sa.Column("document", Json(Alert, cached=True), nullable=False),
     *note_on_alert("noted"),
     *note_on_alert("ended"),
+    sa.Column("ended_kind", sa.String(16)),
 )
 
 # From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance

@@ -135,9 +135,9 @@ class Workspace:
     def quarantine(self) -> Quarantine:
         return Quarantine(self.folder / "quarantine")
 
-    def store(self) -> Store:
-        """Opens the store; raises NothingThere, SchemaOutdated or StoreError."""
-        opened = Store.open(self.location)
+    def store(self, *, or_copy: bool = False) -> Store:
+        """Opens the store, as `Store.open`; raises NothingThere, SchemaOutdated or StoreError."""
+        opened = Store.open(self.location, or_copy=or_copy)
         return opened.acting_as(self.actor) if self.actor else opened
 
     @contextmanager
@@ -166,7 +166,7 @@ def changed_in(location: str | Path) -> tuple[int | None, Mapping[str, object]]:
     None where there is no store that says: whoever needs the store is told by the store itself.
     """
     try:
-        with Store.open(location) as store:
+        with Store.open(location, or_copy=True) as store:
             current = store.settings.list_current()
             return store.settings.newest(), {key: each.value for key, each in current.items()}
     except ShmError:

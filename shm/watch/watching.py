@@ -86,8 +86,9 @@ class AlertState:
     def still(self, test: WatchedTest, end: float) -> AlertState:
         """Return what is in force at a test: all but what tests of two visits have below `end`.
 
-        A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two
-        tests that agree have reported ends once the shift has come back, too.
+        A van that stands on the deck for a day ends nothing; neither do unknown shifts. A called
+        change rests on two visits already. What two tests that agree have reported ends once the
+        shift has come back, too.
         """
         fading = {
             condition: self.fading.get(condition, test.time)
@@ -95,7 +96,8 @@ class AlertState:
             for condition in ((drift.quantity, way) for way in _WAYS)
             if condition in self.beyond and self._looks_over(condition, drift, end)
         }
-        ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
+        is_called = test.change.called
+        ended = {e for e, since in fading.items() if is_called or test.time - since > OF_ONE_VISIT}
         in_force = replace(
             self,
             beyond={each: at for each, at in self.beyond.items() if each not in ended},
@@ -341,7 +343,7 @@ def _alert(
     still_beyond = [
         replace(each, probability=max(each.probability, level))
         for each in test.drifts
-        if condition_of(each) in standing.beyond.keys() - standing.agreed
+        if condition_of(each) in standing.beyond.keys() - standing.agreed - standing.fading.keys()
     ]
     words = message_of(
         test,

@@ -19,6 +19,7 @@ from shm.store import Workspace
 from shm_cli import main
 from tests.cli.conftest import Ended, Shm
 from tests.helpers.command_lines import commands, examples, words_of
+from tests.helpers.no_room import no_room
 from tests.helpers.workspaces import write_test
 
 NEEDS_NO_WORKSPACE = {
@@ -143,6 +144,15 @@ OF_FILES = {"export"}
 
 def has_json(command: click.Command) -> bool:
     return any("--json" in parameter.opts for parameter in command.params)
+
+
+@pytest.mark.parametrize("line", ["status", "alerts", "drift", "ingest --held"])
+def test_reading_commands_read_on_a_full_disk(on_copy: Shm, line: str) -> None:
+    expected = on_copy.done(line).told
+    with no_room():
+        ended = on_copy(line)
+    assert (ended.code, ended.told) == (0, expected)
+    assert ended.err.startswith("Nothing can be written: the store ")
 
 
 def test_every_command_that_a_script_would_call_takes_json() -> None:

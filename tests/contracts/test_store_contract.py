@@ -52,7 +52,7 @@ def test_golden_files_hold_what_was_made() -> None:
     status = calls.golden("status")["document"]
     assert status["recordings"] == {
         "received": 0, "identified": 0, "updated": 0, "watched": 0, "done": 3, "refused": 1,
-        "held": 1,
+        "held": 1, "discarded": 0,
     }  # fmt: skip
     assert calls.golden("alert")[0]["kinds"] == ["held"]
     assert {each["schema"] for each in calls.golden("alert")} == {"shm.alert/1"}

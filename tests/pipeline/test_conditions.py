@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 import pytest
 
 from shm.pipeline.conditions import Evidence, conditions_of
 from shm.pipeline.reconcile import SHM, reconcile
 from shm.store import StoredAlert
-from shm.store.alerts import TEST_DISCARDED
-from shm.store.rows import AlertNote
-from shm.values import Alert, WatchedTest
+from shm.store.rows import AlertNote, Ending
+from shm.values import Alert, AlertKind, WatchedTest
 from tests.helpers.nouns import NOW, a_drift, a_watched_test, an_alert
 from tests.watch.test_agreement import HANGER
 
@@ -54,13 +53,17 @@ def decide(
     changes = reconcile(is_open, conditions_of(known, found, 1))
     at = tests[-1].time
     ended = [
-        replace(each, resolution=AlertNote(each.id, SHM, changes.to_close[each.id], at))
+        replace(each, resolution=_note(each.id, SHM, at, *changes.to_close[each.id]))
         if each.id in changes.to_close
         else each
         for each in known
     ]
     new = enumerate(changes.to_open, len(known) + 1)
     return ended + [StoredAlert(id_, alert, at, baseline_id=1) for id_, alert in new]
+
+
+def _note(alert_id: int, who: str, at: datetime, ending: Ending, why: str = "") -> AlertNote:
+    return AlertNote(alert_id, who, why, at, ending)
 
 
 def in_order(tests: Sequence[WatchedTest], known: list[StoredAlert]) -> list[StoredAlert]:
@@ -119,7 +122,7 @@ def test_a_threshold_that_is_changed_and_put_back_closes_and_raises() -> None:
 def test_what_a_person_resolved_rings_only_by_two_later_visits() -> None:
     tests = weekly(SOUND, LOST, LOST, LOST, LOST, LOST)
     (one,) = in_order(tests[:3], [])
-    known = [replace(one, resolution=AlertNote(1, "Ann", "a new pin", tests[3].time))]
+    known = [replace(one, resolution=_note(1, "Ann", tests[3].time, Ending.BY_PERSON))]
     assert again(tests[:4], known) == known
     assert again(tests[:5], known) == known
     assert is_open(again(tests, known)) == [False, True]
@@ -129,15 +132,37 @@ def test_what_the_alert_of_a_discarded_test_reported_other_tests_report() -> Non
     """The test is discarded months after the tests behind it, and counts again later."""
     tests = weekly(SOUND, LOST, LOST, LOST)
     (one,) = in_order(tests, [])
-    why = f"{TEST_DISCARDED} Ann: a van on the deck"
-    ended = replace(one, resolution=AlertNote(1, "Ann", why, tests[3].time + 30 * WEEK))
+    out = Ending.TEST_DISCARDED
+    ended = replace(one, resolution=_note(1, "Ann", tests[3].time + 30 * WEEK, out))
     without = [test for test in tests if test.test != "t2"]
     raised = again(without, [ended])
     assert is_open(raised) == [False, True]
     assert raised[1].alert.test == "t3"
     assert again(without, raised) == raised
-    alone = replace(raised[1], resolution=AlertNote(2, "Ann", why, tests[3].time + 31 * WEEK))
+    alone = replace(raised[1], resolution=_note(2, "Ann", tests[3].time + 31 * WEEK, out))
     assert is_open(again(without[:2], [ended, alone])) == [False, False]  # nothing calls for it
     back = again(tests, [ended, alone])
     assert is_open(back) == [False, False, True]
     assert back[2].alert.key == "loss:t2:again-1"
+
+
+@pytest.mark.parametrize("kind", ["repeat the test", "tests disagree", "check the baseline"])
+@pytest.mark.parametrize(("raised", "expected"), [("t1", False), ("t3", True)])
+def test_an_alert_of_a_change_answers_notices_of_before(
+    kind: AlertKind, raised: str, expected: bool
+) -> None:
+    tests = weekly(SOUND, LOST, LOST, LOST)
+    at = next(test.time for test in tests if test.test == raised)
+    notice = replace(an_alert("notice", raised), time=at, kinds=(kind,), drifts=())
+    known = in_order(tests, [StoredAlert(1, notice, at, baseline_id=1)])
+    assert is_open(known) == [expected, True]
+
+
+def test_an_alert_that_two_visits_renewed_ends_where_no_call_holds() -> None:
+    """Of a loss that was restored most tests are discarded; they count again afterwards."""
+    tests = weekly(SOUND, LOST, LOST, SOUND, SOUND, LOST, LOST)
+    known = in_order(tests, [])
+    assert is_open(known) == [False, True]
+    left = [*tests[:5], *(replace(t, drifts=tests[4].drifts) for t in tests[5:])]
+    ended = decide(known, left, "t6", list(calls_of(left).values()), is_again=True)
+    assert is_open(ended) == [False, False]

@@ -113,7 +113,8 @@ def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_test_that_calls_
             "hanger-3:two-tests-agree:tension-down:t2:baseline-1",
         ]
         assert [each.test for each in stored] == ["t1", "t2"]
-        assert postman.told == [("mail", each.key) for each in stored]
+        notice, loss = (each.key for each in stored)
+        assert postman.told == [("mail", key) for key in (notice, f"{notice}:resolved", loss)]
         assert {each.state for each in store.alerts.list_deliveries()} == {DeliveryState.DELIVERED}
         assert len(store.watch.list_drifts(3)) == 3
 

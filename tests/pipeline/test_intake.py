@@ -48,6 +48,16 @@ def test_a_sidecar_goes_along(workspace: Workspace) -> None:
         assert path.with_name("h3.toml").read_text() == "hanger = 3\n"
 
 
+def test_the_same_bytes_under_another_suffix_are_archived_once(workspace: Workspace) -> None:
+    for name in ("t1.csv", "t1.txt"):
+        put(workspace.spool / name, "content")
+    assert [take(workspace, name).outcome for name in ("t1.csv", "t1.txt")] == [
+        Outcome.NEW, Outcome.DUPLICATE,
+    ]  # fmt: skip
+    (kept,) = files_in(workspace.archive.folder)
+    assert kept.suffix == ".csv"
+
+
 def test_a_file_in_a_subfolder_keeps_it_in_its_name(workspace: Workspace) -> None:
     (workspace.spool / "logger").mkdir()
     put(workspace.spool / "logger" / "h3.csv", "force,acc_1\n")

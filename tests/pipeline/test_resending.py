@@ -41,8 +41,10 @@ def test_what_was_given_up_waits_again_and_is_told_once(given_up: Workspace) -> 
     with a_flow(given_up, clock=Clock(AT + timedelta(minutes=1)), notifier=postman) as flow:
         flow.drain()
         flow.drain()
-    assert postman.told == [("mail", first.alert.key)]
-    assert states(given_up) == [(DeliveryState.DELIVERED, 1), (DeliveryState.GIVEN_UP, 1)]
+    key = first.alert.key  # a notice, which the second alert has answered
+    assert postman.told == [("mail", key), ("mail", f"{key}:resolved")]
+    told, given = (DeliveryState.DELIVERED, 1), (DeliveryState.GIVEN_UP, 1)
+    assert states(given_up) == [told, given, told]
 
 
 def test_the_list_says_why_a_hook_was_not_told_and_the_command_sends_it_again(

@@ -11,8 +11,10 @@ import pytest
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reconcile import SHM, Condition, reconcile
-from shm.report.hanger_status import Status
+from shm.report.hanger_status import Status, hanger_message
 from shm.store import StoredAlert, Workspace
+from shm.store.rows import Ending
+from shm.values.messages import Lead
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.nouns import NOW, an_alert
@@ -58,7 +60,7 @@ def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_it
     assert ([each.key for each in first.to_open], first.to_close) == (["b"], {})
     opened = StoredAlert(8, holds.alert, NOW)
     again = reconcile([told, opened], [Condition(told.alert, "over", "gone"), holds])
-    assert (again.to_open, again.to_close) == ((), {7: "gone"})
+    assert (again.to_open, again.to_close) == ((), {7: (Ending.OVER, "gone")})
     # A condition that comes back once its alert is closed is another alert.
     assert reconcile([told], [holds]).to_open == (holds.alert,)
 
@@ -123,6 +125,25 @@ def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
     assert again.alert.kinds == raised.alert.kinds
     assert f"Alert {raised.id}, which told of it, was resolved on" in again.alert.message
     assert "of two visits, show it again" in again.alert.message
+
+
+def test_alerts_of_a_loss_that_was_restored_report_what_holds(bridge: Workspace) -> None:
+    """No alert of the return asks to decide on traffic, as it did by the shift reported before."""
+    postman = Postman()
+    for day in range(0, 300, 30):
+        take(bridge, postman, day, 0.84 if 120 <= day < 210 else 1.0)
+        with bridge.store() as store:
+            alerts = [each for each in store.alerts.list_all() if each.resolution is None]
+            (state,) = hanger_summaries(bridge, store, utc_now())
+        if day == 180:
+            (lost,) = alerts  # it answers the notice on the first test that showed the loss
+            assert "beyond threshold" in lost.alert.kinds
+            assert Lead.of(lost.alert.message).urgency == hanger_message(state).urgency == "today"
+    (back,) = alerts
+    assert back.alert.kinds == ("sudden change",)
+    assert "tension rose by" in back.alert.message
+    assert "beyond its threshold" not in back.alert.message
+    assert Lead.of(back.alert.message).urgency == hanger_message(state).urgency == "week"
 
 
 def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same(

@@ -154,6 +154,18 @@ def test_twins_without_a_test_of_their_own_are_not_told_apart() -> None:
     assert doubt_of(a_test(NINE), Known(twin), [known(NINE, 3)]) is None
 
 
+@pytest.mark.parametrize(("tension", "doubt"), [(1.0, False), (1.1, True)])
+def test_a_hanger_back_at_its_baseline_is_not_its_sister(tension: float, doubt: bool) -> None:
+    """An identical one hangs as tight as it once did, or tighter: then it is that one."""
+    baseline = known(NINE, 4).tests
+    lost = tuple(a_test(NINE, 20 + n, tension=0.85) for n in range(5))
+    sister = replace(NINE, id=9)
+    of_sister = [a_test(NINE, 30 + n, tension=tension * 1.003) for n in range(2)]
+    mine = Known(NINE, (*baseline, *lost), baseline)
+    found = doubt_of(a_test(NINE, tension=tension), mine, [Known(sister, tuple(of_sister))])
+    assert (found is not None and found.hanger == sister.id) is doubt
+
+
 def test_one_mistaken_mode_and_missing_ones_are_no_other_hanger() -> None:
     test = a_test(NINE)
     wrong = replace(test.modes[3], frequency_hz=test.modes[4].frequency_hz * 0.97)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 import threading
 from pathlib import Path
@@ -13,6 +14,7 @@ from shm.errors import StoreBusy, StoreError
 from shm.store import Stage, Store, database
 from shm.store.recordings import count_stages, list_recordings
 from shm.store.watch import list_selected_models
+from tests.helpers.no_room import no_room
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.quick_stores import AS_SHIPPED
 
@@ -60,6 +62,28 @@ def test_a_full_disk_is_told_and_waited_for(file_store: Store) -> None:
         file_store.recordings.receive(a_file(1, file_name="x" * 10_000_000), NOW)
     assert caught.value.retry_after_s == 60.0
     assert "Free some space" in str(caught.value)
+
+
+def test_a_store_without_room_is_read_from_a_copy(file_store: Store, tmp_path: Path) -> None:
+    """A killed process left its newest rows in the log, and there is no room for an index of it."""
+    file_store.recordings.receive(a_file(1), NOW)
+    left = tmp_path / "left"
+    left.mkdir()
+    source = Path(str(file_store.engine.url.database))
+    for suffix in ("", "-wal"):
+        shutil.copyfile(f"{source}{suffix}", left / f"shm.db{suffix}")
+    assert (left / "shm.db-wal").stat().st_size > 0
+    with no_room(), pytest.raises(StoreError):
+        Store.open(left / "shm.db")
+    with no_room():
+        store = Store.open(left / "shm.db", or_copy=True)
+    with store:
+        assert store.copied
+        assert [each.file.sha256 for each in list_recordings(store)] == [a_file(1).sha256]
+        with store.reading(), store.reading() as second:
+            assert second.execute(sa.text("SELECT count(*) FROM recordings")).scalar() == 1
+        with pytest.raises(StoreError, match="cannot be written"):
+            store.recordings.receive(a_file(2), NOW)
 
 
 def test_a_store_that_cannot_be_written_says_what_to_do(file_store: Store) -> None:

@@ -10,7 +10,7 @@ import pytest
 from shm.errors import UsageError
 from shm.store import Stage, Store
 from shm.store.journal import change_document, list_changes
-from shm.store.recordings import find_discard
+from shm.store.recordings import count_stages, find_discard
 from shm.store.rows import Decision
 from shm.store.tests import list_decisions
 from tests.helpers.nouns import NOW, a_watched_test
@@ -78,6 +78,8 @@ def test_what_is_withdrawn_counts_no_more_and_later_tests_are_watched_again(stor
 def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
     store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
     store.recordings.exclude(HELD, "Ada", "a copy", LATER)
+    counts = count_stages(store)
+    assert (counts["discarded"], counts["refused"]) == (2, 1)
     newest = [tuple(change_document(row).values()) for row in list_changes(store, 2)]
     newest = [(who, action, detail) for *_, who, _via, action, _of, detail in newest]
     assert newest == [

@@ -28,6 +28,7 @@ from shm.store.journal import (
 )
 from shm.store.posteriors import list_history
 from shm.store.recordings import count_stages, find_latest_hold, list_holds
+from shm.store.rows import Ending
 from shm.store.schema import changed_objects
 from shm.store.tables import SCHEMA, metadata, tests
 from shm.store.tests import list_baseline_tests, list_known_samples
@@ -53,7 +54,7 @@ def test_the_schema_named_in_the_code_is_the_newest_migration() -> None:
 def test_a_database_of_each_release_and_of_today_is_kept() -> None:
     """0.1.0 had the first schema, 1.0.0 the fourteenth; the fifteenth came after it."""
     numbers = [path.stem.removeprefix("schema_") for path in RELEASED]
-    assert numbers == ["0001", "0014", "0015", SCHEMA]
+    assert numbers == ["0001", "0014", "0015", "0016", SCHEMA]
 
 
 @pytest.mark.parametrize("released", RELEASED, ids=lambda path: path.stem)
@@ -111,6 +112,30 @@ def test_a_database_of_the_first_release_has_alerts_open_and_what_is_known_of_it
             rows = connection.execute(sa.select(tests.c.taken_at, tests.c.temperature_c)).all()
         stored_tests = [each.test for each in store.tests.list_all(3)]
         assert [tuple(row) for row in rows] == [(t.time, t.temperature_c) for t in stored_tests]
+
+
+@pytest.mark.parametrize(
+    ("who", "why", "kind"),
+    [
+        ("shm", "judged again with the thresholds in force (tension 5 %)", Ending.JUDGED_AGAIN),
+        ("Ann", "test discarded by Ann: a van", Ending.TEST_DISCARDED),
+        ("shm", "tests t3 and t4, of two visits, do not show it any more", Ending.OVER),
+        ("Ann", "a new pin", Ending.BY_PERSON),
+    ],
+)
+def test_how_an_alert_ended_was_its_first_words(
+    who: str, why: str, kind: Ending, tmp_path: Path
+) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(RELEASED[3], path)
+    with closing(sqlite3.connect(path)) as former, former:
+        ended = "UPDATE alerts SET ended_at = raised_at, ended_who = ?, ended_why = ? WHERE id = 1"
+        former.execute(ended, (who, why))
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        end = store.alerts.get(1).resolution
+        assert end is not None
+        assert (end.who, end.why, end.ending) == (who, why, kind)
 
 
 @pytest.mark.parametrize("schema", [1, 2])

@@ -9,6 +9,7 @@ import pytest
 
 from shm.errors import StoreError
 from shm.store import Reconciled, Store
+from shm.store.rows import Ending
 from shm.store.streams import (
     StreamWatchCheckpoint,
     find_first_unpooled,
@@ -50,7 +51,9 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     state = load_stream_watch(store, 3)
     assert state is not None
     assert (again, state.content) == ((), b"later")
-    store.streams.save_pooled(a_reading(2), b"over", Reconciled((), {raised.id: "over"}))
+    store.streams.save_pooled(
+        a_reading(2), b"over", Reconciled((), {raised.id: (Ending.OVER, "over")})
+    )
     (over,) = store.alerts.list_all(3, standing=False)
     assert over.resolution is not None
     assert over.resolution.at == NOW + timedelta(hours=3)

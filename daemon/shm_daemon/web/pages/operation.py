@@ -21,9 +21,10 @@ from shm.pipeline.intake import learn_from_answer
 from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.store import ENDED, DeliveryState, Workspace
+from shm.store import DeliveryState, Workspace
 from shm.store.alerts import count_deliveries
 from shm.store.recordings import count_stages, find_latest_hold, find_oldest_waiting
+from shm.store.rows import ON_THE_WAY
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan
@@ -52,7 +53,8 @@ _STAGES = {
     "updated": "updated, wait for the watch",
     "watched": "watched, wait for their alerts to be sent",
     "done": "finished",
-    "refused": "not usable as they are, or discarded",
+    "refused": "not usable as they are",
+    "discarded": "excluded by a person",
     "held": "implausible: counts in nothing until a person decides",
 }
 _OTHER_STAGE = "at a stage that this version of shm does not know"
@@ -204,8 +206,7 @@ def _modified_ns(path: Path) -> int:
 
 def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
     seen_s, counts = state["daemon_seen_seconds_ago"], state["recordings"]
-    ended = sum(counts[stage] for stage in ENDED)
-    under_way = sum(counts.values()) - ended
+    under_way = sum(counts[stage] for stage in ON_THE_WAY)
     owed, oldest = state["deliveries"], state["oldest_waiting_at"]
     return [
         (

@@ -14,7 +14,7 @@ from alembic import op
 
 from shm.store.tables import metadata
 
-revision = "0016"
+revision = "0017"
 down_revision = "0001"
 branch_labels = None
 depends_on = None
@@ -48,6 +48,13 @@ _FIRST_STEPS = (
     "FROM old_recordings UNION ALL SELECT identified_at, 1, id, 'identified', recording_id, id, "
     "'', '', NULL, NULL, version FROM old_tests"
 )
+# Before it was a kind it was said by the first words.
+_ENDINGS = (
+    "UPDATE alerts SET ended_kind = CASE "
+    "WHEN ended_why LIKE 'judged again with the thresholds in force%' THEN 'judged again' "
+    "WHEN ended_why LIKE 'test discarded by %' THEN 'test discarded' "
+    "WHEN ended_who = 'shm' THEN 'over' ELSE 'by a person' END WHERE ended_at IS NOT NULL"
+)
 
 
 def upgrade() -> None:
@@ -72,6 +79,8 @@ def upgrade() -> None:
     for prefix, former_table in (("noted", "acknowledgements"), ("ended", "resolutions")):
         if former_table in columns:
             _note_on_alerts(prefix, former_table)
+    if "ended_kind" not in columns.get("alerts", ()):
+        op.execute(_ENDINGS)
     for each in reversed(tables):
         if each.name in metadata.tables and metadata.tables[each.name] not in first:
             _copy(metadata.tables[each.name], columns[each.name])
