@@ -185,7 +185,9 @@ def _is_tone(frequency_hz: float, parts: Stretches, options: IdentifyOptions) ->
     mean = weights @ amplitudes
     change = float(np.sum(np.abs(parts.before.amplitude(turns) - mean) ** 2))
     limit = _SAME_BEFORE if steady > _STEADY else _SURELY_SAME_BEFORE
-    return steady > _FAINTLY_STEADY and change < limit * float(np.sum(np.abs(mean) ** 2))
+    by_chance = float(weights @ weights)  # as steady are random phases in so few stretches
+    faintly = steady - by_chance > _FAINTLY_STEADY * (1 - by_chance)
+    return faintly and change < limit * float(np.sum(np.abs(mean) ** 2))
 
 
 def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
