@@ -194,7 +194,7 @@ def _identified(
         )
     if hanger is not None:
         show_doubts([found.test], hanger)
-    return ModalTestReport(found, records, hanger, (options.band_low_hz, options.band_high_hz))
+    return ModalTestReport(found, records, hanger)
 
 
 def _read(path: Path, workspace: Workspace | None) -> tuple[Recording | FrequencyResponse, ...]:

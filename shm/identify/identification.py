@@ -68,7 +68,8 @@ class Identification:
     reason; `notes` are decisions a reader should know of. `frequency_response`, None where nobody
     hit, has the exponential window of `window_time_constant_s` (inf: none) on it, the modes have
     not; `fit` (points, lines) is what the identified modes make of it, window included. `each_hit`
-    has the modes in each hit by itself.
+    has the modes in each hit by itself. `band_hz` is where modes were looked for; None where nobody
+    says.
     """
 
     test: ModalTest
@@ -82,6 +83,7 @@ class Identification:
     set_aside: tuple[ForeignMode, ...] = ()
     fit: ComplexArray | None = None
     each_hit: tuple[HitModes, ...] = ()
+    band_hz: tuple[float, float] | None = None
 
     def with_orders(self, source: str) -> Identification:
         """Return self, where modes have orders; else raise NotIdentifiable listing the modes."""
@@ -119,6 +121,8 @@ def identify(
     """
     refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
+    slowest_hz = min((record.sampling_rate_hz for record in recordings), default=math.inf)
+    options, asked_hz = options.passed_at(slowest_hz), options.band_high_hz
     measurements = measure_set_ups(records, options)
     recordings = without_unused_force(recordings, measurements)
     steady = tones(measurements, recordings, options)
@@ -143,10 +147,7 @@ def identify(
         free = linear_below_level(measurements, placement.modes) if placement.modes else 1.0
         strange = [f"until {free:.0%} of their level is left, {_KNOCKS}"] if free < 1 else []
         noted = [*found.notes, *strange]
-    hits = sorted(
-        (hit for measurement in measurements for hit in measurement.hits),
-        key=lambda hit: (hit.record, hit.start),
-    )
+    hits = _hits_in_time(measurements)
     amplitude = _amplitude(hits, options)
     return Identification(
         test=ModalTest(
@@ -157,15 +158,16 @@ def identify(
             **_conditions(records),
         ),
         frequency_response=joined_response(measurements),
-        hits=tuple(hits),
+        hits=hits,
         dropped=_all_dropped(measurements, found.finding),
         poles=found.finding.poles,
-        notes=(*placement.notes, *noted, *_notes_of_hits(measurements)),
+        notes=(*placement.notes, *noted, *_notes_of_records(measurements, options, asked_hz)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=(*quality, *_of_placed(inspection, placement, hanger)),
         set_aside=placement.foreign_modes,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
         each_hit=modes_of_each_hit(measurements, found.apart, placement.modes),
+        band_hz=(options.band_low_hz, options.band_high_hz),
     )
 
 
@@ -295,8 +297,15 @@ def _all_dropped(measurements: Sequence[Measurement], found: Finding) -> tuple[D
     return tuple(entry for entry in (*early, *found.dropped) if entry.count)
 
 
-def _notes_of_hits(measurements: Sequence[Measurement]) -> Iterator[str]:
-    """Yield what hits that are few, or of unknown force, do not tell."""
+def _hits_in_time(measurements: Sequence[Measurement]) -> tuple[Hit, ...]:
+    hits = (hit for measurement in measurements for hit in measurement.hits)
+    return tuple(sorted(hits, key=lambda hit: (hit.record, hit.start)))
+
+
+def _notes_of_records(
+    measurements: Sequence[Measurement], options: IdentifyOptions, asked_hz: float
+) -> Iterator[str]:
+    """Yield what hits that are few, or of unknown force, and a slow logger do not tell."""
     if len(measurements) < LEAST_HITS and all(len(m.decays) < LEAST_HITS for m in measurements):
         yield (
             "fewer than three hits: a frequency's standard deviation is the stated "
@@ -306,6 +315,11 @@ def _notes_of_hits(measurements: Sequence[Measurement]) -> Iterator[str]:
         yield (
             "no force is known: hits are known by the motion after them, amplitudes and frequency "
             "responses are not"
+        )
+    if options.band_high_hz < asked_hz:
+        yield (
+            f"modes were looked for up to {options.band_high_hz:g} Hz: a logger passes 0.4 of its "
+            "sampling rate, and what lies higher may be an image of a faster vibration"
         )
 
 

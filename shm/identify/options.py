@@ -6,7 +6,7 @@ Defaults suit a hanger hit by a soft hammer; others suit records made for their 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from shm.errors import UsageError
@@ -14,7 +14,7 @@ from shm.values import NAN
 
 NO_CROSS_CHECK, AUTO_CROSS_CHECK = "none", "auto"
 PASSED = 0.4
-"""Of the sampling rate: what anti-aliasing filters pass."""
+"""Of the sampling rate: what anti-aliasing filters pass; above, modes may be images of others."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,14 @@ class IdentifyOptions:
                     f"{name} = {value} is too small.",
                     remedy=f"Give at least {low}, or leave it out.",
                 )
+
+    def passed_at(self, sampling_rate_hz: float) -> IdentifyOptions:
+        """Return self, without that part of the band that a logger of that rate does not pass.
+
+        Where none is left, the band stays, for whoever takes the record to refuse.
+        """
+        high_hz = min(self.band_high_hz, PASSED * sampling_rate_hz)
+        return replace(self, band_high_hz=high_hz) if high_hz > self.band_low_hz else self
 
     def at_best(self, frequency_hz: float, damping_ratio: float) -> tuple[float, float]:
         """Return the least relative standard deviations of frequency and damping; 0 with hits.

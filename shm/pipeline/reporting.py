@@ -341,7 +341,6 @@ def modal_test_report(
         found,
         records,
         hanger,
-        (options.band_low_hz, options.band_high_hz),
         bridge=workspace.bridge.name,
         lineage=test_lineage(store, stored),
         settings=settings_words(workspace.settings, IDENTIFY_SETTINGS),

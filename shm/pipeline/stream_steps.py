@@ -11,7 +11,6 @@ import scipy
 
 from shm.errors import NothingThere
 from shm.identify import IdentifyOptions
-from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, pooled, read_window, sensor_faults
 from shm.values import PLANES, Alert, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
@@ -49,10 +48,8 @@ def read_stream_window(
     """
     if not pieces:
         raise NothingThere("none of its samples count.")
-    passed_hz = PASSED * stream.sampling_rate_hz
-    if options.band_low_hz < passed_hz < options.band_high_hz:
-        options = replace(options, band_high_hz=passed_hz)
-    reading = read_window(pieces, stream, known, hanger, options, is_confirmed)
+    passed = options.passed_at(stream.sampling_rate_hz)
+    reading = read_window(pieces, stream, known, hanger, passed, is_confirmed)
     return WindowFound(
         replace(reading, spectrum_db=spectrum_db(pieces)),
         sensor_faults(pieces, stream, known),

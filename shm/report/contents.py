@@ -331,8 +331,8 @@ class ModalTestReport:
     """One identified test as a person checks it.
 
     `records` are those it came from, in the order in which they were given; empty where they are
-    not at hand. `band_hz` is where modes were looked for; None where nobody says. `lineage` names
-    what it was made from, as in a hanger's report; who made the sheet when is empty where unsaid.
+    not at hand. `lineage` names what it was made from, as in a hanger's report; who made the sheet
+    when is empty where unsaid.
     """
 
     __test__: ClassVar[bool] = False  # Told to pytest, which takes every `Test...` for a test.
@@ -340,12 +340,16 @@ class ModalTestReport:
     identification: Identification
     records: Sequence[Recording | FrequencyResponse] = ()
     hanger: Hanger | None = None
-    band_hz: tuple[float, float] | None = None
     bridge: str = ""
     lineage: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
     generated_at: datetime | None = None
     version: str = ""
+
+    @property
+    def band_hz(self) -> tuple[float, float] | None:
+        """Return where modes were looked for; None where nobody says."""
+        return self.identification.band_hz
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

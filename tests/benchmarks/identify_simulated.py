@@ -69,7 +69,7 @@ def fragment(scores: list[TestScore], seed: int) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", type=int, default=500)
+    parser.add_argument("--tests", type=int, default=60, help="2 s each; the page has 500")
     parser.add_argument("--first", type=int, default=0, help="number of the first test")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, choices=(1, 2), default=1)

@@ -53,6 +53,16 @@ def test_a_truck_is_set_apart_and_told() -> None:
     assert len(result.test.modes) == 4
 
 
+def test_mains_that_wander_are_a_tone() -> None:
+    """By a hertz in 3000 over a quarter of an hour: no mode keeps its phase as long."""
+    time = np.arange(RECORD.samples) / RECORD.sampling_rate_hz
+    hum = 0.3 * np.sin(2 * np.pi * 25.0 * time + 1.2 * np.sin(2 * np.pi * time / time[-1]))
+    channels = tuple(replace(c, values=c.values + hum * np.std(c.values)) for c in RECORD.channels)
+    options = replace(OPTIONS, mains_hz=25.0)
+    result = identify([replace(RECORD, channels=channels)], options, test_id="t")
+    assert _named(result, "tones").verdict == "warning"
+
+
 def test_wide_modes_are_kept_with_their_deviations() -> None:
     """Of 2 % damping and six minutes: sqrt(z / (w T)) is 0.0013 at 5 Hz, and SSI has more."""
     options = IdentifyOptions(2.0, 40.0)

@@ -124,6 +124,16 @@ def test_a_recording_of_noise_is_not_identifiable_and_says_why() -> None:
     assert caught.value.remedy
 
 
+def test_identify_looks_up_to_what_a_logger_passes() -> None:
+    """Above 0.4 of the rate a mode may be the image of a faster one."""
+    slow = _test_recording(plan=replace(PLAN, sampling_rate_hz=200.0))
+    result = identify([slow], IdentifyOptions(2.0, 100.0), test_id="t", hanger=HANGER)
+    assert result.band_hz == (2.0, 80.0)
+    assert any("up to 80 Hz" in note for note in result.notes)
+    highest = max(mode.frequency_hz for mode in result.test.modes)
+    assert 70 < highest < 80
+
+
 def test_no_record_and_mixed_records_are_refused() -> None:
     with pytest.raises(BadInput, match="no record"):
         identify([], OPTIONS, test_id="t")

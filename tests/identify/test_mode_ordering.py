@@ -79,6 +79,29 @@ def test_an_unresolved_pair_has_its_order_in_both_planes_and_a_wide_deviation(sh
     assert own[0].frequency_sd_hz == pytest.approx(np.hypot(tenth, merged.frequency_sd_hz))
 
 
+def test_place_modes_seen_askew_stay_in_their_plane() -> None:
+    """Planes 3 % apart, and a sensor's gain shows a longitudinal mode in the transverse one."""
+    found = [
+        replace(mode, frequency_hz=1.03 * mode.frequency_hz)
+        if abs(mode.shape[1]) > abs(mode.shape[0])
+        else mode
+        for mode in hanger_modes()
+    ]
+    askew = found_at(found[3].frequency_hz, found[3].shape[1::2], 45.0)
+    placement = place_modes([*found[:2], askew, *found[4:]], POINTS, HANGER)
+    assert orders_of(placement) == {
+        "transverse": [1, 3, 4, 5, 6, 7],
+        "longitudinal": COUNTED[PLANES[1]],
+    }
+
+
+def test_place_modes_leaves_one_of_a_pattern_unnumbered() -> None:
+    """One frequency fits some bar, and no other order by chance speaks against it."""
+    placement = place_modes([found_at(91.7, np.array([0.95, 1.0, -0.88]))], POINTS, HANGER)
+    assert placement.modes == ()
+    assert [mode.kind for mode in placement.foreign_modes] == ["unnumbered"]
+
+
 def test_without_positions_a_note_says_that_shapes_do_not_help() -> None:
     points = [replace(point, x_m=NAN) for point in POINTS]
     placement = place_modes(hanger_modes(), points, HANGER)

@@ -161,8 +161,15 @@ def make_sheet(
         dropped=(*left, Dropped("poles", 41, "not stable over the model orders")),
         poles=make_poles(modes),
         fit=accelerance(modes, points, response.frequency_hz),
+        band_hz=(2.0, 90.0),
     )
-    return ModalTestReport(found, (make_recording(modes, points, hits),), HANGER, (2.0, 90.0))
+    return ModalTestReport(found, (make_recording(modes, points, hits),), HANGER)
+
+
+def without_records(sheet: ModalTestReport) -> ModalTestReport:
+    """Neither its records nor the hanger at hand, and nobody says which band was asked for."""
+    found = replace(sheet.identification, band_hz=None)
+    return replace(sheet, identification=found, records=(), hanger=None)
 
 
 def warned(sheet: ModalTestReport) -> ModalTestReport:
@@ -264,5 +271,5 @@ SHEETS: dict[str, Callable[[], ModalTestReport]] = {
     "ambient": ambient,
     "warned": lambda: warned(make_sheet()),
     "refused": lambda: refused(make_sheet()),
-    "no records": lambda: replace(make_sheet(), records=(), hanger=None, band_hz=None),
+    "no records": lambda: without_records(make_sheet()),
 }

@@ -169,9 +169,9 @@ class ModalTestView:
             window_time_constant_s=math.nan,
             quality=stored.quality,
             set_aside=stored.set_aside,
+            band_hz=(settings.band_low_hz, settings.band_high_hz) if response is not None else None,
         )
-        band_hz = (settings.band_low_hz, settings.band_high_hz) if response is not None else None
-        return ModalTestReport(found, (), self.workspace.bridge.hanger(stored.hanger), band_hz)
+        return ModalTestReport(found, (), self.workspace.bridge.hanger(stored.hanger))
 
     @property
     def summary(self) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -19,28 +22,47 @@ def least_seconds(band_high_hz: float) -> float:
     return (LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
 
 
-def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int]:
-    """Return the reach of the filter of `band_limited` to either side, and the thinning."""
-    factor = max(1, int(sampling_rate_hz // (RATE_OVER_BAND * band_high_hz)))
-    return (_HALF_LENGTH * factor if factor > 1 else 0), factor
+def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, Fraction]:
+    """Return the reach of the filter of `band_limited` to either side, and the thinning.
+
+    Models count their lags in samples: at a rate left twice as high as the band asks, they see half
+    as long, and the modes of a long hanger's two planes are one to them.
+    """
+    eighths = int(8 * sampling_rate_hz // (RATE_OVER_BAND * band_high_hz))
+    factor = Fraction(max(8, eighths), 8)
+    return (math.ceil(_HALF_LENGTH * factor) if factor > 1 else 0), factor
 
 
 def band_limited(
     signals: FloatArray, sampling_rate_hz: float, band_high_hz: float
 ) -> tuple[FloatArray, float]:
-    """Return signals (channels, samples) at the lowest whole fraction of their rate with the band.
+    """Return signals (channels, samples) at the lowest eighth of their rate that has the band.
 
     Only outputs for which the filter is completely inside the signal are used: there a finite
     filter turns a sum of exponentials into the same exponentials, so poles come out unchanged.
     """
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
-    if factor < 2:
+    if factor == 1:
         return signals, sampling_rate_hz
+    rate_hz = sampling_rate_hz / float(factor)
     if signals.shape[-1] <= 2 * reach:
-        return signals[..., :0], sampling_rate_hz / factor
-    taps = np.sinc(np.arange(-reach, reach + 1) / factor) * np.kaiser(2 * reach + 1, _KAISER_BETA)
-    parts = sliding_window_view(signals, 2 * reach + 1, axis=-1)[..., ::factor, :]
-    return np.asarray(parts @ (taps / taps.sum())), sampling_rate_hz / factor
+        return signals[..., :0], rate_hz
+    parts = sliding_window_view(signals, 2 * reach + 1, axis=-1)
+    limited = np.empty((*signals.shape[:-1], math.ceil(parts.shape[-2] / factor)))
+    phases, step = factor.denominator, factor.numerator  # each phase falls on samples of the signal
+    for phase in range(phases):
+        begin, late = divmod(phase * step, phases)
+        at = (np.arange(-reach, reach + 1.0) - late / phases) / float(factor)
+        taps = np.sinc(at) * _kaiser(at) / float(factor)
+        limited[..., phase::phases] = parts[..., begin::step, :] @ taps
+    return limited, rate_hz
+
+
+def _kaiser(at: FloatArray) -> FloatArray:
+    """Return the window at places in samples of the output."""
+    inside = np.maximum(1 - (at / _HALF_LENGTH) ** 2, 0.0)
+    window = np.i0(_KAISER_BETA * np.sqrt(inside)) / np.i0(_KAISER_BETA)
+    return np.where(np.abs(at) <= _HALF_LENGTH, window, 0.0)
 
 
 def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:

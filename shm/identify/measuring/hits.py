@@ -187,10 +187,11 @@ def _second_impacts(
 
     Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse
     is long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more close to
-    the pulse, where the ringing of an anti-aliasing filter is still above 2 %.
+    the pulse, where the ringing of an anti-aliasing filter is still above 2 %. Its peak may lie
+    half a sample later than the first that is recorded.
     """
     skip = max(1, fall, int(np.ceil(PULSE_SECONDS * sampling_rate_hz)))
-    ringing = RINGING / np.arange(skip, len(after))
+    ringing = RINGING / (np.arange(skip, len(after)) - 0.5)
     limit = np.maximum(after[0] * np.maximum(DOUBLE_SHARE, ringing), DOUBLE_SIGMAS * noise)
     return np.asarray(skip + np.flatnonzero(after[skip:] > limit))
 

@@ -258,7 +258,7 @@ def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
     free = hit.free + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
     signals = _centred(hit, begin, free)
     driven, rate = band_limited(signals, sampling_rate_hz, band_high_hz)
-    first_free = -((begin - free) // factor)
+    first_free = math.ceil((free - begin) / factor)
     return Cut(driven, first_free, rate)
 
 

@@ -26,6 +26,7 @@ from shm.identify.mode_ordering.numbering import (
     LEAST_MODES,
     PLAIN_BAR,
     Basis,
+    FittedBar,
     PlaneModes,
     fit_bar,
     number_modes,
@@ -160,6 +161,8 @@ def place_modes(
         for each in (PLANES if mode in pairs else (plane,))
     ]
     numbered = _number(candidates, points, known)
+    if known and pairs:
+        numbered = replace(numbered, ordered=_without_askew(numbered.ordered, pairs, known))
     if known and look:
         more = _in_gaps(numbered.ordered, look, known, points, turned_rad)
         every = [*numbered.ordered, *more]
@@ -213,10 +216,9 @@ def _number(
         if order
     ]
     least = LEAST_MARGIN if known else -np.inf
-    if known and numbering.basis == "pattern" and len(ordered) < _LEAST_BY_PATTERN:
-        least = np.inf
-    unsure = {id(each.found): each.order for each in ordered if each.margin < least}
-    accepted = [each for each in ordered if each.margin >= least]
+    too_few = known and numbering.basis == "pattern" and len(ordered) < _LEAST_BY_PATTERN
+    accepted = [] if too_few else [each for each in ordered if each.margin >= least]
+    unsure = {id(each.found): each.order for each in ordered if each not in accepted}
     return _Numbered(accepted, numbering.basis, cross_axis, unsure, undecided)
 
 
@@ -243,6 +245,41 @@ def _plane_modes(
     )
 
 
+def _bar_of(sure: Sequence[_Candidate], planes: Sequence[Plane], hanger: Hanger) -> FittedBar:
+    """Return the bar of modes with orders."""
+    groups = [[each for each in sure if each.plane == plane] for plane in planes]
+    frequency_hz = [np.array([each.found.frequency_hz for each in group]) for group in groups]
+    return fit_bar(frequency_hz, tuple(tuple(each.order for each in g) for g in groups), hanger)
+
+
+def _without_askew(
+    sure: Sequence[_Candidate], pairs: Sequence[FoundMode], hanger: Hanger
+) -> list[_Candidate]:
+    """Return the modes, but of a pair only the one whose place the others' bar has there.
+
+    Where the bar has the other plane's mode farther off than half a bandwidth, nothing merged: a
+    turned sensor, or one of wrong gain, shows one plane's mode askew.
+    """
+    others = [each for each in sure if each.found not in pairs]
+    if len(others) < LEAST_MODES or {each.plane for each in others} != set(PLANES):
+        return list(sure)
+    bar = _bar_of(others, PLANES, hanger)
+    if not bar.is_plain:
+        return list(sure)
+
+    def off(each: _Candidate) -> float:
+        own_hz = bar.frequencies_hz(PLANES.index(each.plane), each.order)[-1]
+        return abs(float(own_hz) / each.found.frequency_hz - 1)
+
+    return [
+        each
+        for each in sure
+        if each in others
+        or off(each) < _NEAR + each.found.damping_ratio
+        or off(each) == min(off(copy) for copy in sure if copy.found is each.found)
+    ]
+
+
 def _in_gaps(
     sure: Sequence[_Candidate],
     look: Look,
@@ -251,21 +288,17 @@ def _in_gaps(
     turned_rad: float,
 ) -> list[_Candidate]:
     """Return what a closer look shows at the orders that the bar of the sure modes has, too."""
-    planes = [plane for plane in PLANES if any(each.plane == plane for each in sure)]
-    if len(sure) < LEAST_MODES:
+    known = {(each.plane, each.order) for each in sure}
+    planes = sorted({each.plane for each in sure}, key=PLANES.index)
+    highest = max((each.order for each in sure), default=0)
+    if len(sure) < LEAST_MODES or len(known) == len(planes) * highest:
         return []
-    groups = [[each for each in sure if each.plane == plane] for plane in planes]
-    orders = tuple(tuple(each.order for each in group) for group in groups)
-    highest = max(map(max, orders))
-    if all(len(group) == highest for group in orders):
-        return []
-    frequency_hz = [np.array([each.found.frequency_hz for each in group]) for group in groups]
-    bar = fit_bar(frequency_hz, orders, hanger)
+    bar = _bar_of(sure, planes, hanger)
     gaps = [
         (plane, order, hz)
         for number, plane in enumerate(planes)
         for order, hz in enumerate(bar.frequencies_hz(number, highest).tolist(), 1)
-        if order not in orders[number]
+        if (plane, order) not in known
     ]
     modes, doubtful = look([hz for *_, hz in gaps])
     seen = [*modes, *doubtful] if bar.is_plain else list(modes)

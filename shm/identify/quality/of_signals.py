@@ -217,7 +217,10 @@ def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float,
 def _power(
     record: Recording, first: int, stop: int, inspection: Inspection, *, last: bool = False
 ) -> FloatArray | None:
-    """Return the mean square in the band of the first or last 0.5 s of a stretch, (channels,)."""
+    """Return the mean square in the band of the first or last 0.5 s of a stretch, (channels,).
+
+    A tone is no noise: it is told by itself, and hides no mode but one at its frequency.
+    """
     rate, options = record.sampling_rate_hz, inspection.options
     length = min(stop - first, int(_STRETCH_S * rate))
     if length < max(_LEAST_STRETCH_S * rate, _LEAST_SAMPLES):
@@ -228,4 +231,6 @@ def _power(
     spectrum = np.fft.rfft((cut - cut.mean(axis=1, keepdims=True)) * window, axis=1)
     frequency = np.fft.rfftfreq(length, 1 / rate)
     lines = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
+    for tone in inspection.tones:
+        lines &= np.abs(frequency - tone.frequency_hz) > 2 * rate / length  # half a line of Hann's
     return np.asarray(np.sum(np.abs(spectrum[:, lines]) ** 2, axis=1) / np.sum(window**2) / length)

@@ -178,12 +178,16 @@ def _is_tone(frequency_hz: float, parts: Stretches, options: IdentifyOptions) ->
     if any(low <= frequency_hz <= high for _, low, high in options.disturbance_bands):
         return steady > _STEADY_IN_BAND
     if parts.before is None:
+        if not math.isfinite(parts.later[0].hit):  # each part of ambient motion has its own phase
+            return steady > _STEADY
         apart = _locked(turns, weights, amplitudes, parts) < _LOCKED_TO_HITS
         return steady > _STEADY_UNSEEN_BEFORE and apart
     mean = weights @ amplitudes
     change = float(np.sum(np.abs(parts.before.amplitude(turns) - mean) ** 2))
     limit = _SAME_BEFORE if steady > _STEADY else _SURELY_SAME_BEFORE
-    return steady > _FAINTLY_STEADY and change < limit * float(np.sum(np.abs(mean) ** 2))
+    by_chance = float(weights @ weights)  # as steady are random phases in so few stretches
+    faintly = steady - by_chance > _FAINTLY_STEADY * (1 - by_chance)
+    return faintly and change < limit * float(np.sum(np.abs(mean) ** 2))
 
 
 def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
@@ -196,10 +200,8 @@ def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
 def _locked(
     turns_a_sample: float, weights: FloatArray, amplitudes: ComplexArray, parts: Stretches
 ) -> float:
-    """Return the steadiness of amplitudes referred to hits and forces; 1 for a mode, 0: no hits."""
+    """Return the steadiness of amplitudes referred to hits and forces; 1 for a mode."""
     hits = np.array([part.hit for part in parts.later])
-    if not np.all(np.isfinite(hits)):
-        return 0.0
     forces = np.array([part.force_n for part in parts.later])
     turned = np.exp(2j * np.pi * turns_a_sample * hits) / forces
     return _steadiness(weights, amplitudes * turned[:, np.newaxis])
