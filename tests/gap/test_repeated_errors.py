@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.hypotheses.contract import Design, Hypothesis, Observations
 from shm.gap.hypotheses.problem import GapProblem
 from shm.gap.hypotheses.repeated_errors import (
     STRETCHES,
     ShapeScaling,
     section_loads,
     section_ways,
+    sensor_loads,
 )
 from shm.inference.problem.systematic_errors import errors_of_sensors, felt_by, loads_of_ends
 from shm.models.hanger import Zone, solve
@@ -96,6 +97,28 @@ def test_a_sensor_elsewhere_changes_what_its_load_says(
     agrees = np.bincount(design.shape_mode, here * value) > 0
     change = np.where(agrees, 1.0, -1.0)[design.shape_mode] * (there - here)
     assert _nearest(problem.repeated.sensors, change) < 0.05
+
+
+def test_a_shape_with_nodes_at_all_sensors_has_no_loads_of_places(problem: GapProblem) -> None:
+    """A planned measurement may put its sensors there; what they see of a string is lost digits."""
+    third = int(np.flatnonzero(problem.design.frequency_order == 3)[0])
+    nodes = replace(
+        problem.design,
+        places_m=(HANGER.length_m / 3, 2 * HANGER.length_m / 3),
+        shape_mode=np.full(4, third),
+        shape_place=np.array([0, 0, 1, 1]),
+        shape_component=np.array([0, 1, 0, 1]),
+    )
+
+    def string(design: Design) -> FloatArray:
+        x_m = np.array(design.places_m)[design.shape_place]
+        shape = np.where(design.shape_component == 0, np.sin(3 * np.pi * x_m / HANGER.length_m), 0)
+        scaled = ShapeScaling.of(design, HANGER.length_m).scaled(shape[None])[0]
+        return np.concatenate([np.zeros(design.frequencies), scaled])
+
+    seen = string(nodes)
+    loads, _ = sensor_loads(Observations(nodes, seen, np.ones_like(seen)), string, HANGER)
+    assert np.abs(loads).max() < 0.1
 
 
 def _nearest(loads: FloatArray, change: FloatArray) -> float:

@@ -25,6 +25,7 @@ from shm.values import BoolArray, FloatArray, Hanger, IntArray
 # that no datum feels, and ways that hold less than 1e-4 of the variance, are left out.
 STRETCHES = 48
 _STRETCH_CHANGE, _STEP_SHARE, _LEAST_LOAD, _LEAST_SHARE = 0.01, 1e-4, 1e-9, 1e-4
+_LEAST_SEEN = 1e-3  # of a shape of unit length
 _NOWHERE = np.empty(0)
 
 Predict = Callable[[Design], FloatArray]
@@ -168,7 +169,10 @@ def _cross_components(design: Design, value: FloatArray) -> FloatArray:
 
 
 def _slopes(observations: Observations, predict: Predict, length_m: float) -> FloatArray:
-    """The slopes (S,) of the baseline's shapes along the bar, at the size of those measured."""
+    """Return slopes (S,) of the baseline's shapes along the bar, at the size of those measured.
+
+    0 of a shape that has nodes at all its places: what is measured there is noise.
+    """
     design = observations.design
     count = len(design.places_m)
     step_m = np.where(np.array(design.places_m) < length_m / 2, 1.0, -1.0) * _STEP_SHARE * length_m
@@ -186,7 +190,9 @@ def _slopes(observations: Observations, predict: Predict, length_m: float) -> Fl
         np.bincount(scaling.shape, scaling.weight * here * each)[scaling.shape]
         for each in (value, here)
     )
-    return np.asarray((there - here) / step_m[design.shape_place] * along / size)
+    is_seen = size > _LEAST_SEEN**2
+    scale = np.divide(along, size, out=np.zeros_like(size), where=is_seen)
+    return np.asarray((there - here) / step_m[design.shape_place] * scale)
 
 
 def _remove_scaling(observations: Observations, raw: FloatArray) -> FloatArray:
