@@ -20,6 +20,7 @@ from shm.gap.causes.search import fit_alone, invisible
 from shm.gap.hypotheses.contract import GapOptions, Hypothesis
 from shm.gap.hypotheses.data_checks import usable
 from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.repeated_errors import mode_turns
 from shm.models import AS_DESCRIBED
 from shm.models.effects import EFFECTS, Variant, check_effect_priors
 from shm.models.one_hanger.hanger_model import TENSION
@@ -136,13 +137,26 @@ class Twin:
         z = np.append(self._z, scipy.special.ndtri(shares))
         problem, frequencies = self._problem, self._problem.design.frequencies
         sd = np.append(self.frequency_sd, problem.observations.sd[frequencies:])
-        repeated = problem.repeated.loads
+        errors = problem.repeated
+        errors = replace(errors, sensors=errors.sensors[:, : len(errors.sensor_errors)])
         noise = sd * rng.standard_normal(len(sd))
-        noise += repeated @ rng.standard_normal(repeated.shape[1])
+        noise += errors.loads @ rng.standard_normal(errors.loads.shape[1])
         data = self._predicted(hypothesis, z)
         slopes = (data - self._predicted(hypothesis, z, at_rest=True))[:frequencies]
         slopes += self._slope_sd * rng.standard_normal(frequencies)
+        self._turn(data[frequencies:], rng)
         return self._tests_of(data + noise, slopes)
+
+    def _turn(self, shapes: FloatArray, rng: np.random.Generator) -> None:
+        """Turn the modes whose direction is uncertain, up to halfway to the other plane."""
+        for rows, sd in mode_turns(self._problem.observations):
+            angle = (sd * rng.standard_normal() + np.pi / 4) % (np.pi / 2) - np.pi / 4
+            along, across = shapes[rows].T
+            turned = (
+                np.cos(angle) * along - np.sin(angle) * across,
+                np.sin(angle) * along + np.cos(angle) * across,
+            )
+            shapes[rows] = np.column_stack(turned)
 
     def _predicted(
         self, hypothesis: Hypothesis, z: FloatArray, at_rest: bool = False

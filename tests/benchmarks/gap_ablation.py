@@ -67,7 +67,7 @@ VARIANTS: dict[str, Sequence[Change]] = {
     "planes' errors never alike": [
         (noise, "_correlations", lambda of: [(np.eye(of.design.frequencies), 1.0)])
     ],
-    "shapes as certain as stated": [(noise, "_factor_of_shapes", lambda of: 1.0)],
+    "shapes as certain as stated": [(noise, "_factors_of_shapes", lambda of: [(1.0, 1.0)])],
     "planes never turn": [
         (observations, "turn_of_axes", lambda test, hanger: np.zeros(len(test.modes)))
     ],

@@ -120,7 +120,7 @@ def test_sensor_an_inch_off_costs_a_stocky_bar_its_prior_alone() -> None:
     there, stated = (problem_of([each], hanger=hanger) for each in (test, _at(test, 2.16, 2.185)))
     moved = GapProblem(stated.model, stated.tests, place_sensors(stated))
     true, first_order, found = (_log_evidence(each) for each in (there, stated, moved))
-    assert first_order < true - 6
+    assert first_order < found - 1
     assert found == pytest.approx(true - 2.5**2 / 2, abs=0.3)  # standard deviations
 
 

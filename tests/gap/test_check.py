@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -109,7 +110,8 @@ def test_a_twin_keeps_shapes_and_conditions(twin: Twin, tests: tuple[ModalTest, 
     for own, theirs in zip(made.modes, given.modes, strict=True):
         for one, other in zip(own.shape, theirs.shape, strict=True):
             assert (one.x_m, one.sd) == (other.x_m, other.sd)
-            assert one.value == pytest.approx(other.value, abs=0.1)
+            swings = [math.hypot(each.value, each.cross) for each in (one, other)]
+            assert swings[0] == pytest.approx(swings[1], abs=0.1)  # in whatever direction
 
 
 def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...], twin: Twin) -> None:
@@ -129,7 +131,7 @@ def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...], twin
 def test_the_smallest_size_is_found(checked: Callable[..., GapCheck]) -> None:
     """And a gap in a sound twin is counted."""
     assert checked("sag", least=0.0).false_gaps == 2
-    found = checked("distributed_mass", options=replace(MASS, baseline=""))
+    found = checked("distributed_mass", least=0.005, options=replace(MASS, baseline=""))
     (effect,) = found.effects
     assert found.baseline == "beam1"
     assert found.is_complete

@@ -116,8 +116,9 @@ def test_something_unknown_is_in_the_race_and_foresees_less_surely(race: Race) -
         assert sum(share for share, _ in contender.ways) == pytest.approx(1.0)
         known = next(e for e in race.contenders if f"{e.name} + {UNKNOWN}" == contender.name)
         plane = race.rows[[each.kind for each in race.offered].index("other plane")]
-        variances = [
+        shares = [share for share, _ in contender.ways]
+        *variances, alone = (
             np.trace(seen.covariance[np.ix_(plane, plane)])
             for _, seen in (*contender.ways, known.ways[0])
-        ]
-        assert min(variances[:-1]) > variances[-1]
+        )
+        assert np.average(variances, weights=shares) > alone

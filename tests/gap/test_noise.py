@@ -174,6 +174,21 @@ def test_the_scatter_of_shapes_between_tests_says_how_wrong_their_sds_are() -> N
     assert factor == pytest.approx(1.3, rel=0.07)
 
 
+def test_one_test_leaves_the_sds_of_shapes_open() -> None:
+    own = toy.design()
+    first = own.frequency_test[own.shape_mode] == 0
+    one = replace(
+        own,
+        shape_mode=own.shape_mode[first],
+        shape_place=own.shape_place[first],
+        shape_component=own.shape_component[first],
+    )
+    found = toy.observations(np.zeros(one.size), one)
+    factors = {float(node.covariance.shape[0]) for node in nodes(found)}
+    assert len(factors) == 3
+    assert min(factors) < toy.SHAPE_SD**2 < max(factors)
+
+
 def _drawn_shapes(found: Observations, sd: float, rng: np.random.Generator) -> FloatArray:
     """Unit shapes, alike in all tests, measured with errors of `sd` and scaled again."""
     design = found.design

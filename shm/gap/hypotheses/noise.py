@@ -40,7 +40,9 @@ _SDS, _SDS_OF_SOME = 32, 12  # technical: steps of a fifth and a half in the log
 # Judgement: three standard deviations are wild; data that scatter by less than half of what they
 # state are a chance, or were smoothed.
 _WILD, _LEAST_SCATTER = 3.0, 0.5
+_SETTLED = 0.06  # technical: a factor so well known (126 degrees of freedom) is one number
 _FEWEST = 3  # of two no scatter of a scatter is known
+_HERMITE = ((-1.732, 1 / 6), (0.0, 2 / 3), (1.732, 1 / 6))
 
 
 def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple[NoiseNode, ...]:
@@ -48,16 +50,16 @@ def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple
     repeated = repeated or Repeated.none(observations.design)
     correlations = _correlations(observations)
     observations = replace(observations, sd=drawn_together(observations))
-    shape_sd = observations.sd[observations.design.frequencies :]
-    shape = (_factor_of_shapes(observations) * shape_sd) ** 2
+    stated = observations.sd[observations.design.frequencies :] ** 2
     in_any_case = repeated.frequency + rounding_covariance(observations)
     return tuple(
         NoiseNode(
-            Covariance(frequency + in_any_case, shape, repeated.sensors),
-            float(np.log(weight)),
+            Covariance(frequency + in_any_case, factor**2 * stated, repeated.sensors),
+            float(np.log(weight * share)),
             error,
         )
         for frequency, weight, error in _of_frequencies(observations, correlations)
+        for factor, share in _factors_of_shapes(observations)
     )
 
 
@@ -165,22 +167,24 @@ def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, Float
     return values, np.exp(log_share)
 
 
-def _factor_of_shapes(observations: Observations) -> float:
-    """Return the likeliest true over stated standard deviations of shapes.
+def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
+    """The same for shapes, with weights: from their scatter between tests of one added mass.
 
-    By their scatter between tests; as little is known of them as of those of frequencies.
+    One value where they leave little doubt, else three (Gauss and Hermite's). Scatter beyond three
+    standard deviations counts as three, lest a shape that changes from test to test pass for it.
     """
     scatter, freedom = _between_tests(observations)
+    # As little is known of the standard deviations of shapes as of those of frequencies.
     precision = observations.assumed.stated_sd_log_sd.value**-2 + 2 * freedom
-    return float(scatter ** (2 * freedom / precision))
+    centre = 2 * freedom * np.log(scatter) / precision if freedom else 0.0
+    spread = precision**-0.5
+    if len(observations.design.shape_mode) == 0 or spread < _SETTLED:
+        return [(float(np.exp(centre)), 1.0)]
+    return [(float(np.exp(centre + spread * away)), share) for away, share in _HERMITE]
 
 
 def _between_tests(observations: Observations) -> tuple[float, float]:
-    """Return the scatter of shapes about their means over tests, in stated sds, and its freedom.
-
-    Scatter beyond three standard deviations counts as three, lest a shape that changes from test to
-    test pass for it. Tests of one added mass are compared.
-    """
+    """The scatter of shapes about their means over tests, in stated sds, and its freedom."""
     design = observations.design
     mode = design.shape_mode
     # What is turned at will scatters by more than its own standard deviations say.

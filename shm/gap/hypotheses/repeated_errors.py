@@ -10,7 +10,7 @@ each does to the data (its load) is all there is to know of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -253,16 +253,26 @@ def turn_loads(observations: Observations) -> FloatArray:
     A mode that swings in its plane gains across it by the turn, and loses along it by turn^2 / 2,
     whose root mean square is sqrt(3) / 2 times the turn's variance.
     """
-    design, columns = observations.design, []
-    value = observations.value[design.frequencies :]
-    for mode in np.unique(design.shape_mode[turned_modes(observations)]):
-        in_shape = design.shape_mode == mode
-        across, along = np.zeros((2, len(value)))
-        across[in_shape] = _turned_components(observations)[in_shape]
-        turn = np.sqrt(across @ across / (value[in_shape] @ value[in_shape]))
-        along[in_shape] = np.sqrt(3) / 2 * turn * across[in_shape].reshape(-1, 2)[:, ::-1].ravel()
+    changes, columns = _turned_components(observations), []
+    for rows, turn in mode_turns(observations):
+        across, along = np.zeros((2, len(changes)))
+        across[rows[:, 1]] = changes[rows[:, 1]]
+        along[rows[:, 0]] = np.sqrt(3) / 2 * turn * changes[rows[:, 1]]
         columns += [across, along]
-    return np.column_stack(columns) if columns else np.zeros((len(value), 0))
+    return np.column_stack(columns) if columns else np.zeros((len(changes), 0))
+
+
+def mode_turns(observations: Observations) -> Iterator[tuple[IntArray, float]]:
+    """Yield each mode whose direction is uncertain, with the standard deviation of its turn.
+
+    A mode is the rows (places, 2) of its components along its plane and across; radians.
+    """
+    mode, changes = observations.design.shape_mode, _turned_components(observations)
+    value = observations.value[observations.design.frequencies :]
+    for each in np.unique(mode[turned_modes(observations)]):
+        rows = np.flatnonzero(mode == each)
+        turn = np.linalg.norm(changes[rows]) / np.linalg.norm(value[rows])
+        yield rows.reshape(-1, 2), float(turn)
 
 
 def turned_modes(observations: Observations) -> BoolArray:
