@@ -274,7 +274,7 @@ class WatchCheckpoint:
 
 
 class Ending(StrEnum):
-    """How an alert ended, and with it what may be said of its condition."""
+    """Name how an alert ended, and with it what may be said of its condition."""
 
     OVER = "over"  # its condition is
     BY_PERSON = "by a person"  # who knows what was known by then

@@ -65,7 +65,7 @@ MACHINE = ("clock", "disk", "memory")
 """Checks of `doctor` whose level depends on the machine."""
 VOCABULARY = ("check", "kinds", "kind", "stage")
 """Keys whose texts are names that programs compare with."""
-OF_MACHINE = ("found", "disk_free_bytes")
+OF_MACHINE = ("found", "disk_free_bytes", "disk_bytes")
 """Keys whose values depend on the machine."""
 NOT_PROMISED = ("damaged", "missing")
 """Keys of findings about single rows: SQLite and PostgreSQL check what they hold themselves."""
