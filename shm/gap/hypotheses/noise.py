@@ -168,7 +168,7 @@ def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, Float
 
 
 def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
-    """The same for shapes, with weights: from their scatter between tests of one added mass.
+    """Return the same for shapes, with weights: from their scatter between tests of one added mass.
 
     One value where they leave little doubt, else three (Gauss and Hermite's). Scatter beyond three
     standard deviations counts as three, lest a shape that changes from test to test pass for it.
@@ -184,7 +184,7 @@ def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
 
 
 def _between_tests(observations: Observations) -> tuple[float, float]:
-    """The scatter of shapes about their means over tests, in stated sds, and its freedom."""
+    """Return the scatter of shapes about their means over tests, in stated sds, and its freedom."""
     design = observations.design
     mode = design.shape_mode
     # What is turned at will scatters by more than its own standard deviations say.

@@ -36,7 +36,6 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_READINGS = 2  # of one there is no difference
-_FREE_TURN = 2.0  # numerical: radians; far more than a right angle, so that none counts
 
 
 @dataclass(frozen=True)
@@ -228,7 +227,7 @@ def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
     apart = [abs(at[PLANES[0], order] - at[PLANES[1], order]) for order in orders]
     distance = np.interp([mode.order for mode in test.modes], orders, apart)
     coupling = hanger.assumptions.plane_coupling.value
-    turn = coupling / np.maximum(distance, coupling / _FREE_TURN)
+    turn = coupling / np.maximum(distance, coupling / (np.pi / 2))  # a right angle is any
     return np.where(turn > hanger.scatter.sensor_turn, turn, 0.0)
 
 

@@ -25,7 +25,6 @@ from shm.values import BoolArray, FloatArray, Hanger, IntArray
 # that no datum feels, and ways that hold less than 1e-4 of the variance, are left out.
 STRETCHES = 48
 _STRETCH_CHANGE, _STEP_SHARE, _LEAST_LOAD, _LEAST_SHARE = 0.01, 1e-4, 1e-9, 1e-4
-_LEAST_SEEN = 1e-3  # of a shape of unit length
 _NOWHERE = np.empty(0)
 
 Predict = Callable[[Design], FloatArray]
@@ -190,7 +189,7 @@ def _slopes(observations: Observations, predict: Predict, length_m: float) -> Fl
         np.bincount(scaling.shape, scaling.weight * here * each)[scaling.shape]
         for each in (value, here)
     )
-    is_seen = size > _LEAST_SEEN**2
+    is_seen = size > _LEAST_LOAD
     scale = np.divide(along, size, out=np.zeros_like(size), where=is_seen)
     return np.asarray((there - here) / step_m[design.shape_place] * scale)
 
