@@ -16,7 +16,10 @@ from tests.helpers.gap_campaigns import problem_of, simulated
 from tests.helpers.hangers import HANGER_3
 
 PLAN: dict[str, Any] = {"modes": 4, "as_made": False, "shape_sd": 1e-3, "hanger": HANGER_3}
-APART = replace(HANGER_3, assumptions=HANGER_3.assumptions.with_numbers(plane_coupling=1e-6))
+APART = replace(
+    HANGER_3,
+    assumptions=HANGER_3.assumptions.with_numbers(plane_coupling=1e-6, out_of_round_sd=0.0),
+)
 """Its planes are so far apart that none of its modes turns by itself."""
 SIZE = np.array([0.1, 0.4, 1.0, 0.8])
 
@@ -104,9 +107,9 @@ def test_a_coupling_turns_a_pair_by_its_share_of_their_distance(test: ModalTest)
     ]
     modes = (*pair, Mode(PLANES[0], 2, 15.0))
     turn = turn_of_axes(replace(test, modes=modes), HANGER_3)
-    assert turn == pytest.approx(np.full(3, expected), rel=0.01)
+    assert turn[:, 0] == pytest.approx(np.full(3, expected), rel=0.01)
     alone = replace(test, modes=modes[:1])
-    assert turn_of_axes(alone, HANGER_3) == pytest.approx(np.zeros(1))
+    assert not turn_of_axes(alone, HANGER_3).any()
 
 
 @pytest.mark.parametrize("degrees", [5.0, 40.0])

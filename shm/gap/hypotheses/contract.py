@@ -95,10 +95,11 @@ class Observations:
     """The data vector of a design: `value` and `sd` (data,).
 
     `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one. `turned`
-    (data,), None where nothing is, is what one standard deviation of a turn about the hanger's axis
-    does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
-    holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
-    `rounding` (F,), None for none, is the standard deviation that rounding adds to frequencies.
+    (data, 2), None where nothing is, is what one standard deviation of a turn about the hanger's
+    axis does to a component of a shape: of its mode alone, and of all modes alike.
+    `known_damping` (F, 2) holds the logarithm of each mode's damping ratio and its standard
+    deviation; NaN where unknown. `rounding` (F,), None for none, is the standard deviation that
+    rounding adds to frequencies.
     `misplaced` (S,), None for none, is what moving sensors from their stated places to those of the
     design does to shapes, to first order.
     `assumed` is what the hanger's description assumes of errors.

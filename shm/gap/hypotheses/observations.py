@@ -47,7 +47,7 @@ class _Component:
     axis: int
     value: float
     sd: float
-    turned: float = 0.0
+    turned: tuple[float, float] = (0.0, 0.0)
 
 
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
@@ -62,7 +62,7 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     frequency = np.array([mode.frequency_hz for _, mode in modes])
     sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
     error = hanger.assumptions.shape_error.value
-    turn = np.concatenate([turn_of_axes(test, hanger) for test in tests])
+    turn = np.vstack([turn_of_axes(test, hanger) for test in tests])
     components, lengths = _scaled(
         [_with_errors(_components(k, mode), error, turn[k]) for k, (_, mode) in enumerate(modes)]
     )
@@ -80,12 +80,12 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     )
     shape = np.array([each.value for each in components]) / lengths
     shape_sd = np.array([each.sd for each in components]) / lengths
-    turned = np.array([each.turned for each in components]) / lengths
+    turned = np.reshape([each.turned for each in components], (-1, 2)) / lengths[:, None]
     return Observations(
         design,
         np.concatenate([np.log(frequency), shape]),
         np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
-        np.concatenate([np.zeros_like(sd), turned]) if turned.any() else None,
+        np.vstack([np.zeros((len(sd), 2)), turned]) if turned.any() else None,
         np.array([_damping(mode) for _, mode in modes]),
         rounding_sds(tests),
         hanger.assumptions,
@@ -185,11 +185,11 @@ def _components(index: int, mode: Mode) -> list[_Component]:
     return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
 
 
-def _with_errors(shape: list[_Component], error: float, axes: float) -> list[_Component]:
+def _with_errors(shape: list[_Component], error: float, axes: FloatArray) -> list[_Component]:
     """Return a shape whose components err by a part of its length more than stated, each by itself.
 
-    Where all sensors have two axes its direction may be uncertain, by its `axes` (radians) or by
-    noise.
+    Where all sensors have two axes its direction may be uncertain: by its `axes` (2,), in radians,
+    of this mode alone and of all alike, or by noise.
     """
     least = error * math.hypot(*(each.value for each in shape))
     pairs = list(zip(shape[::2], shape[1::2], strict=False))
@@ -198,37 +198,52 @@ def _with_errors(shape: list[_Component], error: float, axes: float) -> list[_Co
     size = np.array([max(abs(one.value), abs(other.value)) for one, other in pairs])
     sds, noise = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
     swings = _swings(np.array([[one.value, other.value] for one, other in pairs]))
-    across = math.hypot(noise, axes) * swings
+    across = np.outer(swings, [math.hypot(noise, axes[0]), axes[1]]).tolist()
     return [
         replace(each, sd=float(sd), turned=turned)
-        for pair, sd, moved in zip(pairs, np.hypot(sds, least), across.tolist(), strict=True)
-        for each, turned in zip(pair, (0.0, moved), strict=True)
+        for pair, sd, moved in zip(pairs, np.hypot(sds, least), across, strict=True)
+        for each, turned in zip(pair, ((0.0, 0.0), tuple(moved)), strict=True)
     ]
 
 
 def _swings(shape: FloatArray) -> FloatArray:
     """Return how far each place (places,) of a shape (places, 2) swings, in whatever direction."""
     direction = np.linalg.svd(shape)[2][0]
-    return np.asarray(np.copysign(np.hypot(*shape.T), shape @ direction))
+    along = shape @ direction * (1 if direction[0] >= 0 else -1)
+    return np.asarray(np.copysign(np.hypot(*shape.T), along))
 
 
 def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
-    """Return the standard deviation (modes,), in radians, of the direction of each mode.
+    """Return standard deviations (modes, 2), in radians, of the direction of each mode.
 
     A round bar swings in the planes of its supports only as far as these tell the planes apart:
     what couples them turns a pair of modes by its share of their distance (first order of
-    perturbation), freely where they all but coincide. Where the other plane's mode is missing, the
-    distance is that of the next orders. 0 of less than sensors are turned, and of one plane alone.
+    perturbation), freely where they all but coincide. The first is by what couples each pair by
+    itself, the second by a section that is not round, which turns all alike. Where the other
+    plane's mode is missing, the distance is that of the next orders. 0 of less than sensors are
+    turned, and of one plane alone.
     """
     at = {(mode.plane, mode.order): math.log(mode.frequency_hz) for mode in test.modes}
     orders = sorted({order for _, order in at if all((plane, order) in at for plane in PLANES)})
     if not orders:
-        return np.zeros(len(test.modes))
+        return np.zeros((len(test.modes), 2))
     apart = [abs(at[PLANES[0], order] - at[PLANES[1], order]) for order in orders]
     distance = np.interp([mode.order for mode in test.modes], orders, apart)
-    coupling = hanger.assumptions.plane_coupling.value
-    turn = coupling / np.maximum(distance, coupling / (np.pi / 2))  # a right angle is any
-    return np.where(turn > hanger.scatter.sensor_turn, turn, 0.0)
+    by_bending = [_bending_share(mode, hanger) / 2 for mode in test.modes]
+    oval = hanger.assumptions.out_of_round_sd.value * np.array(by_bending)
+    coupling = np.column_stack([np.full(len(oval), hanger.assumptions.plane_coupling.value), oval])
+    least = np.maximum(coupling / (np.pi / 2), np.finfo(float).tiny)  # a right angle is any
+    turn = coupling / np.maximum(distance[:, None], least)
+    return np.where(np.hypot(*turn.T)[:, None] > hanger.scatter.sensor_turn, turn, 0.0)
+
+
+def _bending_share(mode: Mode, hanger: Hanger) -> float:
+    """Return the part of a mode's stiffness that is bending, as of a bar between pins."""
+    wave = mode.order * math.pi / hanger.length_m
+    bending = hanger.bending_stiffness_n_m2 * wave**4
+    return min(
+        1.0, bending / (hanger.mass_per_length_kg_m * (2 * math.pi * mode.frequency_hz) ** 2)
+    )
 
 
 def _scaled(shapes: Sequence[list[_Component]]) -> tuple[list[_Component], FloatArray]:

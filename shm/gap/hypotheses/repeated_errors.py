@@ -247,18 +247,26 @@ class ShapeScaling:
 
 
 def turn_loads(observations: Observations) -> FloatArray:
-    """Return loads (S, k) of the turns of modes whose direction is uncertain, two for each.
+    """Return loads (S, k) of the turns of modes whose direction is uncertain.
 
-    A mode that swings in its plane gains across it by the turn, and loses along it by turn^2 / 2,
-    whose root mean square is sqrt(3) / 2 times the turn's variance.
+    Two for each, and two of a turn of all alike: a mode that swings in its plane gains across it by
+    the turn, and loses along it by turn^2 / 2, whose root mean square is sqrt(3) / 2 times the
+    turn's variance.
     """
-    changes, columns = _turned_components(observations), []
+    changes = _turned_components(observations)
+    side = np.array([1.0, -1.0])[
+        observations.design.frequency_plane[observations.design.shape_mode]
+    ]
+    columns, alike = [], np.zeros((2, len(changes)))
     for rows, turn in mode_turns(observations):
         across, along = np.zeros((2, len(changes)))
-        across[rows[:, 1]] = changes[rows[:, 1]]
-        along[rows[:, 0]] = np.sqrt(3) / 2 * turn * changes[rows[:, 1]]
+        own, of_all = changes[rows[:, 1]].T
+        across[rows[:, 1]] = own
+        along[rows[:, 0]] = np.sqrt(3) / 2 * turn * own
         columns += [across, along]
-    return np.column_stack(columns) if columns else np.zeros((len(changes), 0))
+        alike[0, rows[:, 1]] = side[rows[:, 1]] * of_all
+        alike[1, rows[:, 0]] = np.sqrt(3) / 2 * turn * of_all
+    return np.column_stack([*columns, *alike]) if columns else np.zeros((len(changes), 0))
 
 
 def mode_turns(observations: Observations) -> Iterator[tuple[IntArray, float]]:
@@ -277,14 +285,14 @@ def mode_turns(observations: Observations) -> Iterator[tuple[IntArray, float]]:
 def turned_modes(observations: Observations) -> BoolArray:
     """Return True for components (S,) of shapes whose direction is uncertain."""
     mode = observations.design.shape_mode
-    return np.asarray(np.isin(mode, mode[_turned_components(observations) != 0]))
+    return np.asarray(np.isin(mode, mode[_turned_components(observations).any(axis=1)]))
 
 
 def _turned_components(observations: Observations) -> FloatArray:
-    """Return the change of each component (S,) by one standard deviation of its mode's turn."""
+    """Return changes of each component (S, 2) by one standard deviation of a turn."""
     count = observations.design.frequencies
     if observations.turned is None:
-        return np.zeros(len(observations.value) - count)
+        return np.zeros((len(observations.value) - count, 2))
     return observations.turned[count:]
 
 
