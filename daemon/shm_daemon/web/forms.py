@@ -22,8 +22,7 @@ _MOST_FIELDS = 10  # technical: the longest of our forms, but that of settings, 
 _MOST_SETTINGS = 1000  # technical: three fields each of some 20 settings and of 100 hooks
 _LONGEST_BYTES = 32_768  # technical: a reason of 2,000 letters has 12 each at most as browsers send
 _LONGEST_OF_ANYBODY_BYTES = 8192  # technical: a token and an address have some hundreds
-_LONGEST_TEXT_BYTES = 65_536  # technical: the text with a photo is far shorter
-_LONGEST_WITH_PHOTO_BYTES = LARGEST_PHOTO_BYTES + _LONGEST_TEXT_BYTES
+_LONGEST_WITH_PHOTO_BYTES = LARGEST_PHOTO_BYTES + 65_536  # technical: the text is far shorter
 _FROM_OUR_PAGE = "Send it from our page."
 
 
@@ -43,7 +42,7 @@ async def _with_photo(request: Request) -> tuple[dict[str, str], bytes]:
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise Refused(415, "This is no form with a file.", _FROM_OUR_PAGE)
     limited = _limited(request, _LONGEST_WITH_PHOTO_BYTES, "The photo has more than 5 MB.")
-    async with _parsed(limited, _LONGEST_TEXT_BYTES, max_files=1, max_fields=_MOST_FIELDS) as form:
+    async with _parsed(limited, _LONGEST_BYTES, max_files=1, max_fields=_MOST_FIELDS) as form:
         photo = form.get("photo")
         return _texts(form), await photo.read() if isinstance(photo, UploadFile) else b""
 

@@ -20,7 +20,6 @@ from shm.values.notes import Note, NoteKind
 from shm.watch.engine.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
-_STRIP = 0.28  # layout: height of the temperature, as a share of the tension's
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
 _LOOKS: dict[str, tuple[spec.Symbol, bool, str]] = {
     "baseline set": ("square", True, "green"),
@@ -87,7 +86,7 @@ def _temperature(data: HangerReport) -> spec.Panel | None:
     )  # fmt: skip
     low, high = spec.limits(degrees, room=0.2)
     axis = spec.Axis(label="°C", range=(min(low, high - 5), high))
-    return spec.Panel(y=axis, marks=[tests], height=_STRIP)
+    return spec.Panel(y=axis, marks=[tests], height=0.28)  # layout: as a share of the tension's
 
 
 def _bounds(data: HangerReport) -> Bounds:
