@@ -216,6 +216,6 @@ def test_the_report_marks_and_lists_the_notes_of_its_period(workspace: Workspace
         if isinstance(each, Points) and "rust" in str(each.texts)
     ]
     assert mark.name == "inspection"
-    assert now - timedelta(hours=1) < drawn.panels[0].x.range[1]
+    assert now - timedelta(hours=1) < drawn.panels[-1].x.range[1]
     assert "rust" in str(hanger_json(report)["inspections"])
     assert "rust" in as_html(hanger_paper(report))
