@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from shm.identify import Identification
     from shm.report.paper import Table
     from shm.values import (
         Diagnosis,
@@ -84,7 +85,7 @@ def _table(title: str, head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -
 
 
 def sheet(value: Any) -> Sheet:
-    """Return that of a recording, hanger, modal test, posterior, selection, diagnosis or check."""
+    """Return that of a value which a step of `import shm` takes or gives."""
     return _SHEETS[type(value).__name__](value)
 
 
@@ -114,6 +115,13 @@ def _modal_test(test: ModalTest) -> Sheet:
     when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
     title = f"Modal test {test.id}{whose}, {when}"
     return Sheet(_table(title, MODE_HEADINGS, map(mode_row, test.modes)))
+
+
+def _identification(found: Identification) -> Sheet:
+    """Show the modal test, and below it what its quality warns of and what to do."""
+    doubts = (each for each in found.quality if each.verdict in ("warning", "refused"))
+    words = (f"{each.name}, {each.verdict}: {each.found}. {each.remedy}".strip() for each in doubts)
+    return replace(_modal_test(found.test), notes=tuple(words))
 
 
 def _recording(recording: Recording) -> Sheet:
@@ -241,6 +249,7 @@ _SHEETS: dict[str, Callable[[Any], Sheet]] = {
     "Diagnosis": _diagnosis,
     "GapCheck": _gap_check,
     "Hanger": _hanger,
+    "Identification": _identification,
     "ModalTest": _modal_test,
     "Posterior": posterior_sheet,
     "Recording": _recording,

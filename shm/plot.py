@@ -11,6 +11,7 @@ NothingThere says so.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
@@ -38,7 +39,7 @@ from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.recording_channels import FIGURE as CHANNELS
 from shm.report.figures.recording_channels import TOGETHER
 from shm.report.figures.specification import FigureSpec, Specification
-from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording
+from shm.values import NAN, Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,12 +88,15 @@ def trend(
     """Draw the tension over time: mean and 90 % band by test, nominal, baseline, thresholds.
 
     `posteriors` and `tests` go together, one posterior a test; tests without a time are left out.
+    Where temperatures are known a strip below has them, but not on one `ax`.
 
     Example:
         >>> with shm.Store("arch") as store:
         ...     posteriors = store.posteriors(3)
         ...     figure = shm.plot.trend(posteriors, store.tests(3), store.hanger(3))
     """
+    if ax is not None and not isinstance(ax, Iterable):
+        tests = [replace(test, temperature_c=NAN) for test in tests]
     return _drawn(TREND, _history(posteriors, tests, hanger, baseline), ax)
 
 

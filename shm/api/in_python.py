@@ -14,13 +14,19 @@ _CALLS: tuple[tuple[str, str], ...] = (
         "Give the path of a file with [[hanger]] tables, or of a folder with a bridge.toml; "
         "shm.round_bar(...) describes a bar without a file.",
     ),
-    (r"`?shm import FILE`?", "shm.read(path, planes=..., places_m=...)"),
+    (r"[;.]? `shm import FILE` asks and keeps it for all files of this logger", ""),
+    (r", or say it once for this logger: `shm import FILE`", ""),
+    (
+        r"`?shm import FILE`?( asks for it and keeps it for all files of this logger)?",
+        "shm.read(path, planes=..., places_m=...)",
+    ),
     (r"`shm gap diagnose[^`]*`", "shm.diagnose(tests, hanger)"),
     (r"`shm gap check[^`]*`", "shm.check_gap(tests, hanger)"),
     (r"`shm select[^`]*`", "shm.select(tests, hanger)"),
     (r"`shm update[^`]*`", "shm.update(tests, hanger)"),
     (r"`shm identify[^`]*`", "shm.identify(records, hanger=hanger)"),
-    (r"`?shm ingest --together`?", "shm.identify([first, second], hanger=hanger)"),
+    (r"say which with --hanger N", "say which: shm.load_hanger(path, 3)"),
+    (r"`?(?:shm )?ingest --together`?", "shm.identify([first, second], hanger=hanger)"),
 )
 """Commands in remedies, and what does the same in Python."""
 _IN_A_FILE = re.compile(r"(?=.*\b(planes?|x_m)\b)(?=.*\b(sidecar|header)\b)", re.DOTALL)

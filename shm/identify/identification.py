@@ -57,10 +57,11 @@ from shm.values import (
     as_test_id,
     collect_known_conditions,
 )
+from shm.values.showing import Displayable
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Displayable):
     """Hold what a test says, and how it came to say so.
 
     `quality` holds a figure for everything that can be wrong with a test; `set_aside` what rings
@@ -84,6 +85,9 @@ class Identification:
     fit: ComplexArray | None = None
     each_hit: tuple[HitModes, ...] = ()
     band_hz: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Identification of {self.test!r}>"
 
     def with_orders(self, source: str) -> Identification:
         """Return self, where modes have orders; else raise NotIdentifiable listing the modes."""

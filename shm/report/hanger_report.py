@@ -213,7 +213,10 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
     value = formatting.with_half(alone, data.tension_unit)
     repeats = stated(data.by_latest_test, data.tension_unit).repeatability
     scatter = f"; repeatability {repeats} (sd)" if repeats else ""
-    return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval{scatter}"),)
+    doubt = "" if data.by_latest_test.is_usable else "do not use it; "
+    caveats = "".join(f". {each.rstrip('.')}" for each in data.now.caveats_of_latest)
+    note = f"{doubt}test {data.latest.id}; 90 % interval{scatter}{caveats}"
+    return (("Latest test alone", value, note),)
 
 
 def _at_level(data: HangerReport) -> tuple[Fact, ...]:

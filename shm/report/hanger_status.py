@@ -48,15 +48,15 @@ _LEADS: dict[str, tuple[str, str]] = {
         "No action is needed: the daemon is at work, or waits for more tests for a baseline.",
     ),
     "in doubt": (
-        "{name}: its tension is in doubt.",
+        "{name}: {what} is in doubt.",
         f"Check its description and the numbers of its modes {NEXT_TEST}.",
     ),
     "unusable": (
-        "{name}: do not use its tension.",
+        "{name}: do not use {what}.",
         f"Check its description and the numbers of its modes {WEEK}.",
     ),
     "not converged": (
-        "{name}: do not use its tension.",
+        "{name}: do not use {what}.",
         "Raise `samples` in bridge.toml and run "
         f"`shm ingest --again {{test}} --from updated` {WEEK}.",
     ),
@@ -258,6 +258,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
     status, lead = _decide(known)
     statement = HangerMessage(status, lead, known.notes if status else ())
     caveats = known.tension.caveats if known.tension else ()
+    if (doubted := known.doubted) is not None and doubted is not known.tension:
+        caveats += tuple(f"By the latest test: {each}" for each in doubted.faults)
     if known.diagnosed:
         caveats = (*(each.replace(DIAGNOSE, "") for each in caveats), known.diagnosed)
     return replace(statement, reasons=(*statement.beyond_lead(known.warnings), *caveats))
@@ -270,7 +272,7 @@ def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
         return None, _lead("waiting", known.hanger, tests=formatting.counted(known.tests, "test"))
     if known.control is not None and (latest := known.control.latest) is not None:
         return Status.CHECK if latest.is_out else Status.STEADY, control_lead(known.control)
-    faults = known.tension.faults if known.tension else ()
+    faults = known.doubted.faults if known.doubted else ()
     status = status_of(
         known.drifts,
         known.hanger,
@@ -316,11 +318,13 @@ def control_lead(chart: ControlChart) -> Lead:
 
 def _in_doubt(known: HangerSummary) -> Lead:
     """Return what to do about a tension whose caveats say that something is wrong."""
-    if known.tension is None or known.tension.is_usable:
-        return _lead("in doubt", known.hanger)
-    if known.tension.has_converged:
-        return _lead("unusable", known.hanger)
-    return _lead("not converged", known.hanger, test=known.latest.name if known.latest else "")
+    what = "its tension" if known.doubted is known.tension else "the tension by its latest test"
+    if known.doubted is None or known.doubted.is_usable:
+        return _lead("in doubt", known.hanger, what=what)
+    if known.doubted.has_converged:
+        return _lead("unusable", known.hanger, what=what)
+    test = known.latest.name if known.latest else ""
+    return _lead("not converged", known.hanger, what=what, test=test)
 
 
 def still_detected(

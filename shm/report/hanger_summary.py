@@ -159,27 +159,40 @@ class HangerSummary:
 
         It is the baseline's tension, moved by the change since: both intervals go into its own.
         Where the tests since do not show a change, it is the baseline's. Before there is a
-        baseline, and where the watch has not compared the latest test, it is that test's. The
-        repeatability is always the latest test's.
+        baseline, and where the watch has not compared the latest test, it is that test's. Its
+        caveats are those of what it rests on; the repeatability is always the latest test's.
         """
         if self.latest is None or self.baseline is None:
             return self.latest.tension if self.latest else None
         of_test, drift = self.latest.tension, self.drift
         if drift is None and not self.is_baseline:
             return of_test
-        caveats = of_test.caveats if of_test.faults else (*of_test.caveats, *self.baseline.faults)
-        known = replace(
-            self.baseline,
-            caveats=tuple(dict.fromkeys(caveats)),
-            repeatability_sd_n=of_test.repeatability_sd_n,
-        )
+        known = replace(self.baseline, repeatability_sd_n=of_test.repeatability_sd_n)
         if drift is None or not self._follows_change:
             return known
+        caveats = tuple(dict.fromkeys((*known.caveats, *of_test.faults)))
         moved = _moved(known.tension_n, drift.shift_mean, drift.shift_sd)
         above, slack = _beyond_limits(moved, self.hanger.limits)
         return replace(
-            known, tension_n=moved, probability_above_limit=above, probability_slack=slack
+            known,
+            tension_n=moved,
+            probability_above_limit=above,
+            probability_slack=slack,
+            caveats=caveats,
         )
+
+    @property
+    def caveats_of_latest(self) -> tuple[str, ...]:
+        """Return the caveats of the latest test by itself that the shown tension does not have."""
+        if self.latest is None or self.tension is None:
+            return ()
+        return tuple(x for x in self.latest.tension.caveats if x not in self.tension.caveats)
+
+    @property
+    def doubted(self) -> Averaged | None:
+        """Return the tension that is at fault: the one that is shown, else the latest test's."""
+        both = (self.tension, self.latest.tension if self.latest else None)
+        return next((each for each in both if each and each.faults), None)
 
     @property
     def tension_n(self) -> Interval | None:

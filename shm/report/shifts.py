@@ -79,20 +79,17 @@ def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
 
 
 def shift_table(pattern: BridgePattern) -> Table:
-    """Return shifts of the tension since each hanger's baseline; not compared ones last."""
+    """Return shifts of the tension since each hanger's baseline; the note names the others."""
     unit, places = shift_unit(pattern)
-    rows = [_shift(row, unit, places) for row in pattern.rows]
-    rows += [
-        (str(each.hanger), "not known", "not known", "not compared", _day(each.time))
-        for each in pattern.not_compared
-    ]
+    others = ", ".join(str(each.hanger) for each in pattern.not_compared)
     return Table(
         "Shifts along the bridge",
         ("hanger", f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of"),
-        tuple(rows),
+        tuple(_shift(row, unit, places) for row in pattern.rows),
         note="Shift of the tension since the baseline at each hanger's latest test, if there is "
         "any, without the effect of the temperature, with 90 % intervals; whether it has lost "
-        "or gained, with the probability of that.",
+        "or gained, with the probability of that."
+        + (f" Without a recent test, so not compared: {others}." if others else ""),
     )
 
 

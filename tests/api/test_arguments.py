@@ -22,8 +22,26 @@ HANGER = shm.round_bar(
 )
 TEST = ModalTest("t1", (Mode("transverse", 1, 5.8), Mode("transverse", 2, 13.0)))
 Call = Callable[[Path], object]
+
+
+def _two_hangers(path: Path) -> Path:
+    file = path.with_name("two.toml")
+    lines = "diameter_m = 0.13\nlength_m = 12.0\nelastic_modulus_pa = 200e9\ndensity_kg_m3 = 7800"
+    tables = (f"[[hanger]]\nid = {n}\nnominal_tension_n = 711e3\n{lines}\n" for n in (1, 2))
+    file.write_text("".join(tables))
+    return file
+
+
+def _without_units(path: Path) -> Path:
+    file = path.with_name("plain.csv")
+    file.write_text("time,a1,a2\n" + "".join(f"{n / 100},0.1,0.2\n" for n in range(200)))
+    return file
+
+
 REFUSED: tuple[tuple[Call, type[ShmError], str, str], ...] = (
     (lambda _: shm.load_hanger("nope.toml"), BadInput, "nope.toml: no such file", "shm.round_bar("),
+    (lambda p: shm.load_hanger(_two_hangers(p)), BadInput, "2 [[hanger]]", "load_hanger(path, 3)"),
+    (lambda p: shm.read(_without_units(p)), BadInput, "no channel holds", 'unit = "m/s2".'),
     (lambda _: shm.Store("/nonexistent"), BadInput, "no such file in /nonexistent", "a folder"),
     (lambda p: shm.identify(str(p)), UsageError, "records holds", "shm.identify(shm.read(path))"),  # type: ignore[arg-type]
     (lambda p: shm.identify([p]), UsageError, "records holds", "shm.identify(shm.read(path))"),  # type: ignore[list-item]

@@ -42,6 +42,17 @@ def test_line_and_summary_say_what_is_not_known() -> None:
     assert "time not recorded, temperature not recorded" in alone.summary()
 
 
+def test_identification_shows_its_modes_and_doubts(identified: shm.Identification) -> None:
+    warned = replace(
+        identified.quality[0], verdict="warning", found="few hits", remedy="Hit it again."
+    )
+    found = replace(identified, quality=(warned,))
+    assert repr(found) == f"<Identification of {found.test!r}>"
+    assert found.summary().startswith(found.test.summary())
+    assert found.summary().endswith(f"{warned.name}, warning: few hits. Hit it again.")
+    assert "<table" in found._repr_html_()
+
+
 def test_summary_has_report_words(posterior: shm.Posterior, test_of_711_kn: shm.ModalTest) -> None:
     doubted = replace(posterior, description_off_sd=5.0)
     diagnosis = a_diagnosis()

@@ -172,6 +172,19 @@ def test_note_with_photo_and_mark(browser: httpx.Client, workspace: Workspace) -
         refused = browser.post("/notes", data={**NOTE, **wrong}, files=file)
         assert (wrong, refused.status_code // 100) == (wrong, 4)
 
+    form = {"Content-Type": "multipart/form-data; boundary=x"}
+    part = b'--x\r\nContent-Disposition: form-data; name="%d"\r\n\r\na\r\n'
+    for body, status in {
+        b"no form": 400,
+        b"--x\r\nContent-Disposition: form-data\r\n\r\na\r\n--x--": 400,  # of no name
+        b"".join(part % number for number in range(50)) + b"--x--": 400,
+        part % 1 + b"a" * 70_000: 400,
+        part.replace(b"%d", b'photo"; filename="a') + b"a" * 6_000_000: 413,
+        part % 1 + part % 2: 409,  # broken off: a note of no kind
+    }.items():
+        refused = browser.post("/notes", content=body, headers=form)
+        assert (body[:20], refused.status_code) == (body[:20], status), refused.text[:500]
+
     sign_in(browser, "reader")
     shown = browser.get("/hangers/3").text
     assert "Notes and inspections (2)" in shown
@@ -203,6 +216,6 @@ def test_the_report_marks_and_lists_the_notes_of_its_period(workspace: Workspace
         if isinstance(each, Points) and "rust" in str(each.texts)
     ]
     assert mark.name == "inspection"
-    assert now - timedelta(hours=1) < drawn.panels[0].x.range[1]
+    assert now - timedelta(hours=1) < drawn.panels[-1].x.range[1]
     assert "rust" in str(hanger_json(report)["inspections"])
     assert "rust" in as_html(hanger_paper(report))

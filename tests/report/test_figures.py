@@ -120,7 +120,8 @@ def test_drawing_is_repeatable_and_changes_no_setting(season: HangerReport) -> N
 
 def test_trend_has_levels_and_alerts(figures: Figures, season: HangerReport) -> None:
     assert season.baseline_tension_n is not None
-    (axes,) = figures["season"]["trend"].figure.axes
+    axes, temperature = figures["season"]["trend"].figure.axes
+    assert temperature.get_ylabel() == "°C"
     named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
     levels = [float(np.asarray(line.get_ydata())[0]) for line in named]
     baseline = season.baseline_tension_n.mean / 1e3

@@ -20,6 +20,7 @@ from shm.report.hanger_summary import (
     LatestTest,
 )
 from shm.values import NAN, Averaged, Drift, Limits, Summary
+from shm.values.posterior import LEFT_OUT
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, an_alert
 
@@ -104,6 +105,28 @@ def test_doubts_of_the_baseline_hold_for_what_rests_on_it() -> None:
     assert found.tension is not None
     assert found.tension.faults == (doubt,)
     assert now().message.status is Status.ALERT
+
+
+@pytest.mark.parametrize(
+    ("drifts", "basis", "caveats"),
+    [
+        ((drift(0.03, sd=0.04),), BASELINE_ALONE, (LEFT_OUT,)),
+        ((drift(0.004),), BASELINE_AND_CHANGE, (LEFT_OUT, "Do not use this tension.")),
+    ],
+)
+def test_caveats_are_of_the_tension_shown(
+    drifts: tuple[Drift, ...], basis: str, caveats: tuple[str, ...]
+) -> None:
+    """A hopeless latest test does not spoil the baseline, but is said, and is not quiet."""
+    hopeless = tension(300e3, caveats=("Do not use this tension.",))
+    found = now(
+        latest=LatestTest("t9", NOW, hopeless), baseline=tension(caveats=(LEFT_OUT,)), drifts=drifts
+    )
+    assert found.tension is not None
+    assert (found.basis, found.tension.caveats) == (basis, caveats)
+    assert found.message.status is Status.CHECK
+    assert ("by its latest test" in found.message.words) is (basis == BASELINE_ALONE)
+    assert any("Do not use this tension." in each for each in found.message.reasons)
 
 
 def test_limits_are_judged_by_the_same_tension() -> None:

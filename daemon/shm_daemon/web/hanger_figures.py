@@ -58,7 +58,7 @@ class HangerFigure:
 # Judgement: heights in pixels; the usual, or more for several panels and long words.
 FIGURES: tuple[HangerFigure, ...] = (
     HangerFigure("trends", CONTROL, lambda view: view.report and view.report.now.control),
-    HangerFigure("trends", TREND, lambda view: view.report, 440, shows_states=True),
+    HangerFigure("trends", TREND, lambda view: view.report, 480, shows_states=True),
     HangerFigure("trends", STIFFNESS, lambda view: view.report, 520, shows_states=True),
     HangerFigure("trends", TEMPERATURE, lambda view: view.report),
     HangerFigure("model", FREQUENCIES, lambda view: view.report, 380),

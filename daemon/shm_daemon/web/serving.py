@@ -131,7 +131,7 @@ def make_server(app: ASGIApp, address: Address) -> uvicorn.Server:
 def refuse_uninstalled() -> None:
     """Raise UsageError where the extra `[web]` is not installed; loads nothing of it."""
     with needing("web"):
-        for name in ("fastapi", "plotly", "prometheus_client", "uvicorn"):
+        for name in ("fastapi", "plotly", "prometheus_client", "python_multipart", "uvicorn"):
             if find_spec(name) is None:
                 raise ImportError(f"No module named {name!r}", name=name)
 

@@ -33,7 +33,10 @@ _LOOKS: dict[str, tuple[spec.Symbol, bool, str]] = {
 
 
 def _specify(data: HangerReport) -> spec.Specification | None:
-    """Return the panel in the one unit of the report; None without a test of a known time."""
+    """Return the tension in the one unit of the report, over the temperature where it is known.
+
+    None without a test of a known time.
+    """
     rows = data.dated_trend
     if not rows:
         return None
@@ -63,7 +66,27 @@ def _specify(data: HangerReport) -> spec.Specification | None:
         *time_axes.changes(data.states.within(data.period).changes, shown),
     ]  # fmt: skip
     axis = spec.Axis(label=f"tension ({data.tension_unit.name})", range=view)
-    return spec.stacked([spec.Panel(y=axis, marks=marks, x=time_axes.time_axis(shown))], 3.4, 5)
+    tension = spec.Panel(y=axis, marks=marks, x=time_axes.time_axis(shown))
+    temperature = _temperature(data)
+    if temperature is None:
+        return spec.stacked([tension], 3.4, 5)
+    return spec.stacked([replace(tension, x=None), replace(temperature, x=tension.x)], 4.2, 5)
+
+
+def _temperature(data: HangerReport) -> spec.Panel | None:
+    """Return a strip of the temperature at each dated test; None where none is known."""
+    known = [each for each in data.dated_trend if math.isfinite(each.row.temperature_c)]
+    if not known:
+        return None
+    degrees = np.array([each.row.temperature_c for each in known])
+    chosen = time_axes.places(degrees)
+    tests = spec.Points(
+        x=_picked([each.time for each in known], chosen), y=degrees[chosen], colour="orange",
+        size=3.6, texts=[f"{known[i].row.test}: {degrees[i]:.1f} °C" for i in chosen],
+    )  # fmt: skip
+    low, high = spec.limits(degrees, room=0.2)
+    axis = spec.Axis(label="°C", range=(min(low, high - 5), high))
+    return spec.Panel(y=axis, marks=[tests], height=0.28)  # layout: as a share of the tension's
 
 
 def _bounds(data: HangerReport) -> Bounds:
@@ -234,6 +257,7 @@ def _caption(data: HangerReport) -> str:
         tests,
         f"{lines}.",
         f"{found[:1].upper()}{found[1:]}." if found else "",
+        "Below: the temperature at each test." if _temperature(data) else "",
         time_axes.thinned_words(len(rows)).strip(),
         f"{formatting.counted(undated, 'test')} without a time left out." if undated else "",
     )

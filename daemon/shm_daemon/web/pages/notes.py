@@ -20,7 +20,8 @@ router = APIRouter(prefix=NOTES, include_in_schema=False)
 @router.post("")
 def write(site: AtSite, writer: Uploader, form: FormWithPhoto) -> Response:
     """Store a note of an operator, and show it where it was written."""
-    words = {name: value.decode("utf-8", "replace").strip() for name, value in form.items()}
+    texts, photo = form
+    words = {name: text.strip() for name, text in texts.items()}
     number, now, who = words.get("hanger", ""), utc_now(), writer.actor
     try:
         hanger = int(number) if number else None
@@ -33,8 +34,7 @@ def write(site: AtSite, writer: Uploader, form: FormWithPhoto) -> Response:
     if hanger is not None:
         site.workspace.bridge.tested(hanger)
     text = words.get("text", "").replace("\r\n", "\n")  # as browsers send lines
-    store, image = site.store.acting_as(who), form.get("photo", b"")
-    store.notes.add(hanger, at, kind, text, who.name, now, image)
+    site.store.acting_as(who).notes.add(hanger, at, kind, text, who.name, now, photo)
     return RedirectResponse("/#notes" if hanger is None else f"/hangers/{hanger}#notes", 303)
 
 
