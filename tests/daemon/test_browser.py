@@ -251,7 +251,7 @@ def test_an_uploaded_file_becomes_a_test(signed_in: Browser, site: Site, tmp_pat
 def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, site: Site) -> None:
     page = signed_in.open(f"{site.url}/alerts")
     before = page.locator("article.card.open").count()
-    card = page.locator("article.card").last
+    card = page.locator("article.card", has_text="tension fell").first
     card.get_by_text("Acknowledge", exact=True).click()
     card.get_by_label("Result").fill("A clamp had slipped; <set> right.")
     card.get_by_role("button").click()

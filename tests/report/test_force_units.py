@@ -107,7 +107,7 @@ def test_report_tells_tensions_in_unit(season: HangerReport, tension_n: float, u
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
 def test_figures_are_in_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     (item,) = drawn((TREND,), of_size(season, tension_n))
-    (trend,) = item.figure.axes
+    trend, *_ = item.figure.axes
     assert trend.get_ylabel() == f"tension ({unit})"
     marks = next(line for line in trend.lines if line.get_label() == "alert")
     assert marks.get_ydata() == pytest.approx([tension_n / force_unit(tension_n).newtons])
