@@ -302,6 +302,7 @@ def _all_dropped(measurements: Sequence[Measurement], found: Finding) -> tuple[D
 
 
 def _hits_in_time(measurements: Sequence[Measurement]) -> tuple[Hit, ...]:
+    """Return the hits of all measurements, by record and start."""
     hits = (hit for measurement in measurements for hit in measurement.hits)
     return tuple(sorted(hits, key=lambda hit: (hit.record, hit.start)))
 
