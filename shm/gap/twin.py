@@ -20,7 +20,7 @@ from shm.gap.causes.search import fit_alone, invisible
 from shm.gap.hypotheses.contract import GapOptions, Hypothesis
 from shm.gap.hypotheses.data_checks import usable
 from shm.gap.hypotheses.problem import GapProblem
-from shm.gap.hypotheses.repeated_errors import mode_turns
+from shm.gap.hypotheses.repeated_errors import quarter_turn
 from shm.models import AS_DESCRIBED
 from shm.models.effects import EFFECTS, Variant, check_effect_priors
 from shm.models.one_hanger.hanger_model import TENSION
@@ -73,7 +73,7 @@ class Twin:
         self.tests = tuple(_without_slopes(test) for test in used)
         rng = np.random.default_rng(seed)
         options = GapOptions(baseline if tests else baseline or AS_DESCRIBED)
-        self._problem = self._with_levels(choose_baseline(self.tests, hanger, options, rng))
+        self._settle(choose_baseline(self.tests, hanger, options, rng))
         if tests:
             fit = fit_alone(self._problem, rng)
             self._z, self.misfit_percent = fit.z, self._problem.misfit_percent(fit)
@@ -81,14 +81,22 @@ class Twin:
         self._z, self.misfit_percent = _as_described(self._problem), NAN
         self.tests = self._tests_of(self._predicted(ALONE, self._z), self._slope_sd)
         options = GapOptions(self.baseline)
-        self._problem = self._with_levels(choose_baseline(self.tests, hanger, options, rng))
+        self._settle(choose_baseline(self.tests, hanger, options, rng))
 
     def __reduce__(self) -> tuple[type[Twin], tuple[object, ...]]:
         tests, hanger, seed = self._made_of
         return Twin, (tests, hanger, self.baseline, seed)  # a problem cannot be pickled
 
+    def _settle(self, problem: GapProblem) -> None:
+        """Take the problem of tests that also show small amplitudes, if slopes are known.
+
+        Beside it the same whose modes swing in their planes, whatever was measured.
+        """
+        self._problem = problem = self._with_levels(problem)
+        straight = replace(problem.observations, turns=None)
+        self._straight = GapProblem(problem.model, problem.tests, straight, problem.described)
+
     def _with_levels(self, problem: GapProblem) -> GapProblem:
-        """Return the problem of tests that also show small amplitudes, if slopes are known."""
         found = problem.observations
         levels = {0.0, *found.design.survey.amplitudes}
         if not np.isfinite(self._slope_sd).any() or len(levels) == 1:
@@ -144,19 +152,20 @@ class Twin:
         data = self._predicted(hypothesis, z)
         slopes = (data - self._predicted(hypothesis, z, at_rest=True))[:frequencies]
         slopes += self._slope_sd * rng.standard_normal(frequencies)
-        self._turn(data[frequencies:], rng)
+        data[frequencies:] = self._turned(data[frequencies:], rng)
         return self._tests_of(data + noise, slopes)
 
-    def _turn(self, shapes: FloatArray, rng: np.random.Generator) -> None:
-        """Turn the modes whose direction is uncertain, up to halfway to the other plane."""
-        for rows, sd in mode_turns(self._problem.observations):
-            angle = (sd * rng.standard_normal() + np.pi / 4) % (np.pi / 2) - np.pi / 4
-            along, across = shapes[rows].T
-            turned = (
-                np.cos(angle) * along - np.sin(angle) * across,
-                np.sin(angle) * along + np.cos(angle) * across,
-            )
-            shapes[rows] = np.column_stack(turned)
+    def _turned(self, shapes: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return shapes (S,) in an uncertain direction, up to halfway to the other plane."""
+        found = self._problem.observations
+        if found.turns is None:
+            return shapes
+        own, *common = found.turns.T
+        angle = own * rng.standard_normal(len(own)) + rng.standard_normal(len(common)) @ common
+        angle = (angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        angle = np.where(found.is_turned, angle[found.design.shape_mode], 0.0)
+        other, sign = quarter_turn(found.design)
+        return np.asarray(np.cos(angle) * shapes + np.sin(angle) * sign * shapes[other])
 
     def _predicted(
         self, hypothesis: Hypothesis, z: FloatArray, at_rest: bool = False
@@ -166,7 +175,7 @@ class Twin:
             design = self._problem.design
             conditions = tuple(replace(each, amplitude=0.0) for each in design.conditions)
             design = replace(design, conditions=conditions)
-        return np.asarray(self._problem.predict(hypothesis, z[None], design)[0])
+        return np.asarray(self._straight.predict(hypothesis, z[None], design)[0])
 
     def _tests_of(self, data: FloatArray, slopes: FloatArray) -> tuple[ModalTest, ...]:
         """Return modal tests of data (data,) and of amplitude slopes (F,), NaN if not known."""

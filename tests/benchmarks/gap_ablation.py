@@ -69,7 +69,7 @@ VARIANTS: dict[str, Sequence[Change]] = {
     ],
     "shapes as certain as stated": [(noise, "_factors_of_shapes", lambda of: [(1.0, 1.0)])],
     "planes never turn": [
-        (observations, "turn_of_axes", lambda test, hanger: np.zeros((len(test.modes), 2)))
+        (observations, "turn_of_axes", lambda test, hanger: np.zeros((len(test.modes), 3)))
     ],
     "remainders over orders alone": [(noise, "_patterns", noise._over_orders)],
     "no mirrored places": [(search.Search, "_with_mirrored", lambda of, target, peaks: peaks)],

@@ -10,6 +10,7 @@ from scipy import stats
 
 from shm.gap.hypotheses.contract import Hypothesis
 from shm.gap.hypotheses.coordinates import Coordinates, cut
+from shm.gap.hypotheses.problem import GapProblem
 from shm.models.classes.base import point_mass
 from shm.models.effects import Parameter, Variant
 from shm.models.hanger import solve
@@ -43,7 +44,9 @@ def test_predicted_shapes_have_unit_length_and_the_measured_sign() -> None:
         first, shape=tuple(replace(p, value=-p.value, cross=-p.cross) for p in first.shape)
     )
     tests[0] = replace(tests[0], modes=(*tests[0].modes[:2], turned, *tests[0].modes[3:]))
-    problem = problem_of(tests)
+    made = problem_of(tests)
+    straight = replace(made.observations, turns=None)
+    problem = GapProblem(made.model, made.tests, straight)
     design, value = problem.design, problem.observations.value
     predicted = problem.predict(BASELINE, problem.near)
     for mode in range(design.frequencies):

@@ -17,7 +17,7 @@ from shm.assumptions import DEFAULTS, Assumptions
 from shm.inference.sampler.density import Peak
 from shm.inference.sampler.likelihood import Covariance
 from shm.models.effects import Conditions, Survey, Variant
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 from shm.values.diagnosis import joined
 
 Method: TypeAlias = Literal["screened", "normal", "sampled", "emcee"]
@@ -94,9 +94,9 @@ class Design:
 class Observations:
     """The data vector of a design: `value` and `sd` (data,).
 
-    `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one. `turned`
-    (data, 2), None where nothing is, is what one standard deviation of a turn about the hanger's
-    axis does to a component of a shape: of its mode alone, and of all modes alike.
+    `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one. `turns`
+    (F, 3), None where nothing turns, are standard deviations in radians of the direction in which a
+    mode swings: of its own, and of two causes that turn all modes at once.
     `known_damping` (F, 2) holds the logarithm of each mode's damping ratio and its standard
     deviation; NaN where unknown. `rounding` (F,), None for none, is the standard deviation that
     rounding adds to frequencies.
@@ -108,11 +108,19 @@ class Observations:
     design: Design
     value: FloatArray
     sd: FloatArray
-    turned: FloatArray | None = None
+    turns: FloatArray | None = None
     known_damping: FloatArray | None = None
     rounding: FloatArray | None = None
     assumed: Assumptions = DEFAULTS
     misplaced: FloatArray | None = None
+
+    @property
+    def is_turned(self) -> BoolArray:
+        """Return True for components (S,) of shapes whose direction is uncertain."""
+        mode = self.design.shape_mode
+        if self.turns is None:
+            return np.zeros(len(mode), dtype=bool)
+        return np.asarray(np.any(self.turns[mode], axis=1))
 
     @property
     def damping(self) -> FloatArray:
@@ -133,7 +141,7 @@ class Observations:
             shape_component=design.shape_component[shapes],
         )
         data = np.concatenate([frequencies, design.frequencies + shapes])
-        turned = None if self.turned is None else self.turned[data]
+        turns = None if self.turns is None else self.turns[frequencies]
         rounding = None if self.rounding is None else self.rounding[frequencies]
         damping = self.damping[frequencies]
         misplaced = None if self.misplaced is None else self.misplaced[shapes]
@@ -141,7 +149,7 @@ class Observations:
             part,
             self.value[data],
             self.sd[data],
-            turned,
+            turns,
             damping,
             rounding,
             self.assumed,

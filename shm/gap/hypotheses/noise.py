@@ -28,7 +28,7 @@ import numpy as np
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.gap.hypotheses.contract import Design, Observations
 from shm.gap.hypotheses.observations import rounding_covariance
-from shm.gap.hypotheses.repeated_errors import Repeated, turned_modes
+from shm.gap.hypotheses.repeated_errors import Repeated
 from shm.inference.problem.noise import correlate_model_errors, grid_model_errors, grid_sd_factors
 from shm.inference.sampler.likelihood import Covariance, NoiseNode
 from shm.values import FloatArray, IntArray
@@ -188,7 +188,7 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
     design = observations.design
     mode = design.shape_mode
     # What is turned at will scatters by more than its own standard deviations say.
-    turned = np.where(turned_modes(observations), np.arange(len(mode)), -1)
+    turned = np.where(observations.is_turned, np.arange(len(mode)), -1)
     keys = np.vstack([design.kinds[:, design.frequencies :], turned])
     kind = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
     value, sd = observations.value[design.frequencies :], observations.sd[design.frequencies :]

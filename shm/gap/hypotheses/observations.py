@@ -7,10 +7,10 @@ component spread over the certain ones.
 Where a test says how its frequencies depend on amplitude, it counts as two: its frequencies of
 small amplitude at amplitude 0, and at that of its hits those that change, each by its own slope.
 
-Where two planes' frequencies are all but equal, noise turns both shapes at will: every component
-errs by the same angle times the other component at its place, so that the larger of a place's two
-standard deviations grows with the shape, sd^2 = own^2 + (turn size)^2. Components err independently
-by `own` alone.
+Where two planes' frequencies are all but equal, both shapes may swing in any direction, and noise
+turns them: every component errs by the same angle times the other component at its place, so that
+the larger of a place's two standard deviations grows with the shape, sd^2 = own^2 + (turn size)^2.
+Components err independently by `own` alone.
 
 Frequencies that state no standard deviation may have been rounded. A step is the same number of Hz
 for all modes, so that low ones are much less exact than high ones.
@@ -36,6 +36,7 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_READINGS = 2  # of one there is no difference
+_OWN_TURN = 0.25  # judgement: of a turn by coupling, which is mostly one axis of all modes
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,6 @@ class _Component:
     axis: int
     value: float
     sd: float
-    turned: tuple[float, float] = (0.0, 0.0)
 
 
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
@@ -62,10 +62,14 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     frequency = np.array([mode.frequency_hz for _, mode in modes])
     sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
     error = hanger.assumptions.shape_error.value
-    turn = np.vstack([turn_of_axes(test, hanger) for test in tests])
-    components, lengths = _scaled(
-        [_with_errors(_components(k, mode), error, turn[k]) for k, (_, mode) in enumerate(modes)]
+    shapes, noise = zip(
+        *(_with_errors(_components(k, mode), error) for k, (_, mode) in enumerate(modes)),
+        strict=True,
     )
+    turns = np.vstack([turn_of_axes(test, hanger) for test in tests])
+    turns[:, 0] = np.hypot(turns[:, 0], noise)
+    turns[np.isnan(noise)] = 0.0
+    components, lengths = _scaled(shapes)
     survey = survey_of(tests)
     design = Design(
         survey=survey,
@@ -80,12 +84,11 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     )
     shape = np.array([each.value for each in components]) / lengths
     shape_sd = np.array([each.sd for each in components]) / lengths
-    turned = np.reshape([each.turned for each in components], (-1, 2)) / lengths[:, None]
     return Observations(
         design,
         np.concatenate([np.log(frequency), shape]),
         np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
-        np.vstack([np.zeros((len(sd), 2)), turned]) if turned.any() else None,
+        turns if turns.any() else None,
         np.array([_damping(mode) for _, mode in modes]),
         rounding_sds(tests),
         hanger.assumptions,
@@ -185,56 +188,45 @@ def _components(index: int, mode: Mode) -> list[_Component]:
     return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
 
 
-def _with_errors(shape: list[_Component], error: float, axes: FloatArray) -> list[_Component]:
-    """Return a shape whose components err by a part of its length more than stated, each by itself.
+def _with_errors(shape: list[_Component], error: float) -> tuple[list[_Component], float]:
+    """Return a shape that errs by a part of its length more than stated, and its turn by noise.
 
-    Where all sensors have two axes its direction may be uncertain: by its `axes` (2,), in radians,
-    of this mode alone and of all alike, or by noise.
+    The turn is a standard deviation in radians; NaN unless all sensors have two axes.
     """
     least = error * math.hypot(*(each.value for each in shape))
     pairs = list(zip(shape[::2], shape[1::2], strict=False))
     if not shape or len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
-        return [replace(each, sd=math.hypot(each.sd, least)) for each in shape]
+        return [replace(each, sd=math.hypot(each.sd, least)) for each in shape], math.nan
     size = np.array([max(abs(one.value), abs(other.value)) for one, other in pairs])
-    sds, noise = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
-    swings = _swings(np.array([[one.value, other.value] for one, other in pairs]))
-    across = np.outer(swings, [math.hypot(noise, axes[0]), axes[1]]).tolist()
-    return [
-        replace(each, sd=float(sd), turned=turned)
-        for pair, sd, moved in zip(pairs, np.hypot(sds, least), across, strict=True)
-        for each, turned in zip(pair, ((0.0, 0.0), tuple(moved)), strict=True)
-    ]
-
-
-def _swings(shape: FloatArray) -> FloatArray:
-    """Return how far each place (places,) of a shape (places, 2) swings, in whatever direction."""
-    direction = np.linalg.svd(shape)[2][0]
-    along = shape @ direction * (1 if direction[0] >= 0 else -1)
-    return np.asarray(np.copysign(np.hypot(*shape.T), along))
+    own, turn = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
+    sds = np.repeat(np.hypot(own, least), 2).tolist()
+    return [replace(each, sd=sd) for each, sd in zip(shape, sds, strict=True)], turn
 
 
 def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
-    """Return standard deviations (modes, 2), in radians, of the direction of each mode.
+    """Return standard deviations (modes, 3), in radians, of the direction of each mode.
 
     A round bar swings in the planes of its supports only as far as these tell the planes apart:
     what couples them turns a pair of modes by its share of their distance (first order of
-    perturbation), freely where they all but coincide. The first is by what couples each pair by
-    itself, the second by a section that is not round, which turns all alike. Where the other
-    plane's mode is missing, the distance is that of the next orders. 0 of less than sensors are
-    turned, and of one plane alone.
+    perturbation), freely where they all but coincide. The first is that of each pair by itself, the
+    others turn all pairs to one side: by what couples all alike, and by a section that is not
+    round. Where the other plane's mode is missing, the distance is that of the next orders. 0 of
+    less than sensors are turned, and of one plane alone.
     """
     at = {(mode.plane, mode.order): math.log(mode.frequency_hz) for mode in test.modes}
     orders = sorted({order for _, order in at if all((plane, order) in at for plane in PLANES)})
     if not orders:
-        return np.zeros((len(test.modes), 2))
+        return np.zeros((len(test.modes), 3))
     apart = [abs(at[PLANES[0], order] - at[PLANES[1], order]) for order in orders]
-    distance = np.interp([mode.order for mode in test.modes], orders, apart)
-    by_bending = [_bending_share(mode, hanger) / 2 for mode in test.modes]
-    oval = hanger.assumptions.out_of_round_sd.value * np.array(by_bending)
-    coupling = np.column_stack([np.full(len(oval), hanger.assumptions.plane_coupling.value), oval])
+    distance = np.interp([mode.order for mode in test.modes], orders, apart)[:, None]
+    assumed = hanger.assumptions
+    by_bending = np.array([_bending_share(mode, hanger) / 2 for mode in test.modes])
+    coupling = np.outer(np.ones(len(by_bending)), [_OWN_TURN, math.sqrt(1 - _OWN_TURN**2), 0.0])
+    coupling *= assumed.plane_coupling.value
+    coupling[:, 2] = assumed.out_of_round_sd.value * by_bending
     least = np.maximum(coupling / (np.pi / 2), np.finfo(float).tiny)  # a right angle is any
-    turn = coupling / np.maximum(distance[:, None], least)
-    return np.where(np.hypot(*turn.T)[:, None] > hanger.scatter.sensor_turn, turn, 0.0)
+    turn = coupling / np.maximum(distance, least)
+    return np.where(np.linalg.norm(turn, axis=1)[:, None] > hanger.scatter.sensor_turn, turn, 0.0)
 
 
 def _bending_share(mode: Mode, hanger: Hanger) -> float:

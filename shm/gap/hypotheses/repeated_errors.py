@@ -10,7 +10,7 @@ each does to the data (its load) is all there is to know of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -140,8 +140,9 @@ def sensor_loads(
     of_channel = (2 * place + component)[:, None] == channel
     of_sensor = place[:, None] == sensor
     slopes = _slopes(observations, predict, hanger.length_m)
-    cross = _cross_components(design, value)
-    turned = usual.sensor_turn * np.where(component == 0, cross, -cross)
+    other, sign = quarter_turn(design)
+    turned = -usual.sensor_turn * sign * value[other]
+    cross = np.abs(sign) * value[other]
     raw = np.column_stack(
         [
             usual.sensor_gain * value[:, None] * of_channel,
@@ -157,14 +158,6 @@ def sensor_loads(
     loads = _remove_scaling(observations, raw)
     felt = np.abs(loads).max(axis=0) > _LEAST_LOAD
     return np.asarray(loads[:, felt]), tuple(n for n, f in zip(names, felt, strict=True) if f)
-
-
-def _cross_components(design: Design, value: FloatArray) -> FloatArray:
-    """The other component at each component's place, or 0 (S,)."""
-    key = design.shape_mode * (design.shape_place.max() + 1) + design.shape_place
-    seen = {(k, c): v for k, c, v in zip(key, design.shape_component, value, strict=True)}
-    other = [seen.get((k, 1 - c), 0.0) for k, c in zip(key, design.shape_component, strict=True)]
-    return np.array(other)
 
 
 def _slopes(observations: Observations, predict: Predict, length_m: float) -> FloatArray:
@@ -206,15 +199,18 @@ def _remove_scaling(observations: Observations, raw: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ShapeScaling:
-    """Scale the shapes of a design. All fields are (S,).
+    """Scale the shapes of a design and turn them. All fields are (S,).
 
     `shape` counts the shapes from 0 and goes up, `weight` is that of a component in its shape's
-    length, `reference` is what a component is compared with for the sign.
+    length, `reference` is what a component is compared with for the sign. Shapes that are
+    `is_turned` swing in a direction of their own, by the quarter turn `across`.
     """
 
     shape: IntArray
     weight: FloatArray
     reference: FloatArray
+    across: tuple[IntArray, FloatArray]
+    is_turned: BoolArray
 
     @classmethod
     def measured(cls, observations: Observations) -> ShapeScaling:
@@ -224,76 +220,69 @@ class ShapeScaling:
         precision = 1 / observations.sd[design.frequencies :] ** 2
         mean = np.bincount(shape, precision) / np.bincount(shape)
         value = observations.value[design.frequencies :]
-        return cls(shape, precision / mean[shape], precision * value)
+        weight, turned = precision / mean[shape], observations.is_turned
+        return cls(shape, weight, weight * value, quarter_turn(design), turned)
 
     @classmethod
     def of(cls, design: Design, length_m: float) -> ShapeScaling:
         """To unit length, and to the sign of sin(order pi x/L) in the mode's plane."""
-        mode = design.shape_mode
+        mode, axis = design.shape_mode, design.shape_component
         x_m = np.array(design.places_m)[design.shape_place]
         sine = np.sin(design.frequency_order[mode] * np.pi * x_m / length_m)
-        in_plane = design.frequency_plane[mode] == design.shape_component
-        return cls(_counted(design), np.ones(len(mode)), np.where(in_plane, sine, 0.0))
+        reference = np.where(design.frequency_plane[mode] == axis, sine, 0.0)
+        return cls(_counted(design), np.ones(len(mode)), reference, quarter_turn(design), mode < 0)
 
     def scaled(self, raw: FloatArray) -> FloatArray:
-        """Shapes (n, S) of any scale, scaled."""
+        """Shapes (n, S) of any scale, scaled; those that turn, turned to the reference.
+
+        From these the way that they were turned is taken back, as an arc: what is then left of a
+        measured one is its turn from the plane, however large, times what a small turn does to it
+        (`turn_loads`).
+        """
         if raw.shape[1] == 0:
             return raw
+        length = np.sqrt(self._sum(raw**2 * self.weight))
+        factor = np.where(self._sum(raw * self.reference) < 0, -1.0, 1.0)
+        shape = raw * (factor / np.maximum(length, np.finfo(float).tiny))[:, self.shape]
+        if not self.is_turned.any():
+            return np.asarray(shape)
+        other, sign = self.across
+        across = sign * shape[:, other]
+        angle = np.arctan2(self._sum(across * self.reference), self._sum(shape * self.reference))
+        angle = np.where(self.is_turned, angle[:, self.shape], 0.0)
+        arc = angle * sign * (self.reference / self.weight)[other]
+        return np.asarray(np.cos(angle) * shape + np.sin(angle) * across - arc)
+
+    def _sum(self, values: FloatArray) -> FloatArray:
+        """Return the sums (n, shapes) of values (n, S) over the components of each shape."""
         begins = np.flatnonzero(np.diff(self.shape, prepend=-1))
-        length = np.sqrt(np.add.reduceat(raw**2 * self.weight, begins, axis=1))
-        agrees = np.add.reduceat(raw * self.reference, begins, axis=1)
-        factor = np.where(agrees < 0, -1.0, 1.0) / np.maximum(length, np.finfo(float).tiny)
-        return np.asarray(raw * factor[:, self.shape])
+        return np.asarray(np.add.reduceat(values, begins, axis=1))
+
+
+def quarter_turn(design: Design) -> tuple[IntArray, FloatArray]:
+    """Return the other component at each component's place, and its sign in a quarter turn.
+
+    A turn is from the transverse axis to the longitudinal one. Both are (S,); 0 for the sign where
+    only one axis is measured. A small turn adds as much by the radian.
+    """
+    keys = list(zip(design.shape_mode.tolist(), design.shape_place.tolist(), strict=True))
+    axes = design.shape_component
+    at = {(key, axis): row for row, (key, axis) in enumerate(zip(keys, axes.tolist(), strict=True))}
+    rows = [at.get((key, 1 - axis), -1) for key, axis in zip(keys, axes.tolist(), strict=True)]
+    other = np.array(rows, dtype=np.int64)
+    return other, np.where(other < 0, 0.0, np.where(axes == 0, -1.0, 1.0))
 
 
 def turn_loads(observations: Observations) -> FloatArray:
-    """Return loads (S, k) of the turns of modes whose direction is uncertain.
-
-    Two for each, and two of a turn of all alike: a mode that swings in its plane gains across it by
-    the turn, and loses along it by turn^2 / 2, whose root mean square is sqrt(3) / 2 times the
-    turn's variance.
-    """
-    changes = _turned_components(observations)
-    side = np.array([1.0, -1.0])[
-        observations.design.frequency_plane[observations.design.shape_mode]
-    ]
-    columns, alike = [], np.zeros((2, len(changes)))
-    for rows, turn in mode_turns(observations):
-        across, along = np.zeros((2, len(changes)))
-        own, of_all = changes[rows[:, 1]].T
-        across[rows[:, 1]] = own
-        along[rows[:, 0]] = np.sqrt(3) / 2 * turn * own
-        columns += [across, along]
-        alike[0, rows[:, 1]] = side[rows[:, 1]] * of_all
-        alike[1, rows[:, 0]] = np.sqrt(3) / 2 * turn * of_all
-    return np.column_stack([*columns, *alike]) if columns else np.zeros((len(changes), 0))
-
-
-def mode_turns(observations: Observations) -> Iterator[tuple[IntArray, float]]:
-    """Yield each mode whose direction is uncertain, with the standard deviation of its turn.
-
-    A mode is the rows (places, 2) of its components along its plane and across; radians.
-    """
-    mode, changes = observations.design.shape_mode, _turned_components(observations)
-    value = observations.value[observations.design.frequencies :]
-    for each in np.unique(mode[turned_modes(observations)]):
-        rows = np.flatnonzero(mode == each)
-        turn = np.linalg.norm(changes[rows]) / np.linalg.norm(value[rows])
-        yield rows.reshape(-1, 2), float(turn)
-
-
-def turned_modes(observations: Observations) -> BoolArray:
-    """Return True for components (S,) of shapes whose direction is uncertain."""
-    mode = observations.design.shape_mode
-    return np.asarray(np.isin(mode, mode[_turned_components(observations).any(axis=1)]))
-
-
-def _turned_components(observations: Observations) -> FloatArray:
-    """Return changes of each component (S, 2) by one standard deviation of a turn."""
-    count = observations.design.frequencies
-    if observations.turned is None:
-        return np.zeros((len(observations.value) - count, 2))
-    return observations.turned[count:]
+    """Return loads (S, k) of turns: one of each mode that turns by itself, two of all modes."""
+    design, turned = observations.design, observations.is_turned
+    if observations.turns is None or not turned.any():
+        return np.zeros((len(turned), 0))
+    mode, value = design.shape_mode, observations.value[design.frequencies :]
+    other, sign = quarter_turn(design)
+    own, *common = np.where(turned, sign * value[other] * observations.turns[mode].T, 0.0)
+    each = mode[:, None] == np.unique(mode[turned])
+    return np.column_stack([own[:, None] * each, *common])
 
 
 def _counted(design: Design) -> IntArray:
