@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from shm.report import formatting
 from shm.report.diagnosis_wording import (
     AFTER,
+    inspection,
     is_of_the_measurement,
     label,
     phrase,
@@ -223,10 +224,11 @@ def _off_percent(tension_n: TensionEstimate) -> str:
 
 
 def write_details(diagnosis: Diagnosis) -> str:
-    """Return the second paragraph: the cause with its sizes, what no hit reached, what next."""
+    """Return the second paragraph: the cause, what to look at, what no hit reached, what next."""
     verdict = diagnosis.verdict
     sentences = (
         _state_size(verdict),
+        inspection(verdict.claim.leading) if verdict.claim else "",
         _state_reach(diagnosis) if verdict.outcome is Outcome.NO_GAP else "",
         next_step(diagnosis),
     )

@@ -36,6 +36,19 @@ def is_of_the_measurement(claim: Claim) -> bool:
     return all(effect is not None and not effect.of_the_hanger for effect in known)
 
 
+def inspection(cause: Cause) -> str:
+    """Return what a crew looks at, as a sentence; empty where nothing is to be seen."""
+    from shm.models.effects import EFFECTS
+
+    known = [EFFECTS[name] for name in cause.effects if name in EFFECTS]
+    every = [each.over_time.check if each.over_time else each.check for each in known]
+    checks = [check for check in every if check]
+    if not checks:
+        return ""
+    text = formatting.listed(checks)
+    return f"{text[0].upper()}{text[1:]}."
+
+
 def label(cause: Cause) -> str:
     """Return `rotational end flexibility (both ends)`, for tables and figures."""
     parts = zip(cause.effects, cause.places, strict=True)

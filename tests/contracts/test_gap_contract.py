@@ -171,7 +171,7 @@ def test_an_adopted_cause_has_its_name() -> None:
     when, lineage = datetime(2026, 5, 1, tzinfo=UTC), Lineage("", "", "")
     stored = StoredDiagnosis(1, 3, diagnosis, when, lineage)
     name = adopted_name(("point_mass",), (), "", shm.load_hanger(ROD), stored, ())
-    assert str(name) == "beam1+point_mass@everywhere:x_m=3.36563..3.42338"
+    assert str(name) == "beam1+point_mass@everywhere:x_m=3.36632..3.42457"
 
 
 # ---------------------------------------------------------------- names and signatures

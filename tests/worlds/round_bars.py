@@ -3,7 +3,7 @@
 Planes differ by what a workshop leaves: ends by up to 3 %, bending stiffness by up to 0.6 % to
 either side, in axes that are those of the sensors or lie anywhere. So modes come in pairs 0 to
 0.6 % apart, which no hit tells apart. Sensors are turned by a degree and off by 0.5 % (both
-standard deviations). The motion is the sum of the modes of `bars`, driven by half sines.
+standard deviations); the first may be turned by more. The motion is the sum of the modes of `bars`, driven by half sines.
 """
 
 from __future__ import annotations
@@ -37,8 +37,11 @@ class RoundBar:
     force_n: Array
 
 
-def make_bar(seed: int) -> RoundBar:
-    """Return the bar of a seed with its record; those of odd seeds have axes of their own."""
+def make_bar(seed: int, turned_deg: float = 0.0) -> RoundBar:
+    """Return the bar of a seed with its record; those of odd seeds have axes of their own.
+
+    The first sensor is turned by `turned_deg` beside its error.
+    """
     rng = np.random.default_rng(seed)
     diameter_m, length_m = rng.uniform(0.05, 0.11), rng.uniform(6, 16)
     area = math.pi * diameter_m**2 / 4
@@ -64,7 +67,7 @@ def make_bar(seed: int) -> RoundBar:
     places_m = np.sort(rng.uniform(0.08, 0.45, SENSORS)) * length_m
     hammer_m = float(rng.uniform(0.1, 0.3) * length_m)
     force, moved = _hit(rng, bars, np.append(places_m, hammer_m), axes)
-    heard = _sensed(rng, moved)
+    heard = _sensed(rng, moved, turned_deg)
     return RoundBar(length_m, diameter_m, tension_n, places_m, hammer_m, heard, force)
 
 
@@ -107,9 +110,10 @@ def _gain(bar: Bar, at_m: Array, damping: float, hz: Array) -> NDArray[np.comple
     return found
 
 
-def _sensed(rng: np.random.Generator, moved: Array) -> Array:
+def _sensed(rng: np.random.Generator, moved: Array, turned_deg: float) -> Array:
     """Return what sensors hear that are a little turned, off and noisy."""
     turn = math.radians(1) * rng.standard_normal((moved.shape[1], 1))
+    turn[0] += math.radians(turned_deg)
     heard = np.stack(
         [
             np.cos(turn) * moved[0] - np.sin(turn) * moved[1],

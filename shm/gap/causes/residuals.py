@@ -32,7 +32,7 @@ from shm.values import (
     Trend,
 )
 
-_LEAST_LEFT = 1e-9  # technical: of a datum that the fit follows altogether
+_LEAST_LEFT = 0.01  # numerical: of the variance of a datum that the fit follows but for its bend
 DRAWS = 100  # technical: a mean p-value to a tenth of its spread over draws
 
 

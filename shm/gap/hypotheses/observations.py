@@ -36,7 +36,7 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_READINGS = 2  # of one there is no difference
-_OWN_TURN = 0.25  # judgement: of a turn by coupling, which is mostly one axis of all modes
+_OWN_TURN = 0.5  # judgement: of a turn by coupling; the rest is one axis of all modes
 
 
 @dataclass(frozen=True)

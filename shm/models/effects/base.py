@@ -136,7 +136,8 @@ class Effect:
     conditions of a test that it depends on; where it `dissipates`, damping rises with the level.
     `of_the_hanger` is False for an effect of the measurement, which other sensors would not have;
     `of_readings` is True if it is in readings of the tension alone, which no recording holds.
-    `over_time` is None of an effect that the watch does not look for. `localised_as` is what one is
+    `over_time` is None of an effect that the watch does not look for; then `check` is what a crew
+    looks at first, empty where there is nothing to see. `localised_as` is what one is
     called that a diagnosis looks for at each place along the hanger.
 
     An effect that says no more than that the description is wrong is also named in
@@ -155,6 +156,7 @@ class Effect:
     of_the_hanger: ClassVar[bool] = True
     of_readings: ClassVar[bool] = False
     over_time: ClassVar[OverTime | None] = None
+    check: ClassVar[str] = ""
     localised_as: ClassVar[str] = ""
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:

@@ -199,6 +199,7 @@ class StiffEndZones(Effect):
     name = "stiff_end_zones"
     title = "Stiff zones at the ends"
     phrase = "end zones of {zone_m} with a bending stiffness of {stiffness_ratio}"
+    check = "measure how far sockets and sleeves stiffen the ends"
     source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
     seen_by = ("frequencies", "shapes near the ends")
     imitated_by = (

@@ -25,6 +25,7 @@ class DistributedMass(Effect):
     name = "distributed_mass"
     title = "More mass along the hanger"
     phrase = "a mass per length {mass_change:higher|lower} than described"
+    check = "look for paint, a sheath or grout that the description leaves out"
     source = (
         "Blevins (1979), Formulas for Natural Frequency and Mode Shape; ISO 12494:2001, "
         "Atmospheric icing of structures."
@@ -107,6 +108,7 @@ class PartialMass(Effect):
     name = "partial_mass"
     title = "More mass over a stretch"
     phrase = "a mass per length {mass_change} higher around {x_m}, over {extent_m}"
+    check = "look for a sheath, grout or ice on a part of the hanger"
     source = (
         "Chen (1963), On the vibration of beams or rods carrying a concentrated mass; ISO "
         "12494:2001, Atmospheric icing of structures."
@@ -197,6 +199,7 @@ class IntermediateSupport(Effect):
     title = "Held between the ends"
     localised_as = "lateral spring"
     phrase = "an intermediate support of {stiffness_n_m} at {x_m}"
+    check = "look for a guide, clamp, cable or neighbour that touches the hanger"
     source = "Grossi and Albarracín (2003), Eigenfrequencies of generally restrained beams."
     seen_by = ("frequencies of low orders", "the other plane", "shapes")
     imitated_by = ("sag", "support_motion", "section_loss", "point_mass", "partial_mass")

@@ -76,6 +76,7 @@ class SensorMisalignment(Effect):
     name = "sensor_misalignment"
     title = "Turned sensors"
     phrase = "a sensor direction turned by {angle_deg}"
+    check = "sight along the sensors and turn them into the planes"
     source = "McConnell (1995), Vibration Testing: Theory and Practice."
     seen_by = ("shapes of biaxial sensors",)
     imitated_by = ("skewed_principal_axes",)
@@ -135,6 +136,7 @@ class SkewedPrincipalAxes(Effect):
         "ends that turn about one axis only, {angle_deg} from the transverse plane, "
         "against {log10_k}"
     )
+    check = "look how the pins and plates of both ends lie to the planes"
     source = (
         "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; Perkins and "
         "Mote (1986), Comments on curve veering in eigenvalue problems."
@@ -187,6 +189,7 @@ class LoadScale(Effect):
     name = "load_scale"
     title = "A load cell or jack that is off by a factor"
     phrase = "a load cell or jack that reads {load_error:too much|too little}"
+    check = "check the load cell or the jack against another"
     source = (
         "ISO 376:2011, Calibration of force-proving instruments; fib Bulletin 30 (2005), "
         "Acceptance of stay cable systems."
