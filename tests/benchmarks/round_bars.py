@@ -10,6 +10,7 @@ is named.
 
 from __future__ import annotations
 
+import re
 import sys
 
 import begin
@@ -33,6 +34,12 @@ def recording_of(bar: RoundBar) -> Recording:
     return Recording("round bar", tuple(channels), round_bars.RATE_HZ, hanger=1)
 
 
+def is_at(sensor: str, x_m: float) -> bool:
+    """Return whether words such as `sensor at 2.31 m` are of the sensor at `x_m`."""
+    found = re.fullmatch(r"sensor at ([\d.]+) m", sensor)
+    return found is not None and abs(float(found[1]) - x_m) < 0.006  # rounded to centimetres
+
+
 def main() -> int:
     options = begin.options(__doc__, seeds="100:124", turned=0.0)
     seeds, gaps, held, named = range(*map(int, options.seeds.split(":"))), 0, 0, 0
@@ -50,7 +57,7 @@ def main() -> int:
         held += tension.q025 < bar.tension_n < tension.q975
         leading = f"{found.leading.effect} at {found.leading.at}" if found.leading else "-"
         places = (found.leading.at, *found.leading.also_at) if found.leading else ()
-        named += any(f"{bar.places_m[0]:.2f} m" in each for each in places)
+        named += any(is_at(each, bar.places_m[0]) for each in places)
         print(
             f"{seed}: {len(test.modes)} modes, {outcome.value}, {leading},"
             f" no gap {found.no_gap_probability:.2f}, unknown {found.unexplained_probability:.2f},"
