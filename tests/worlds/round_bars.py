@@ -3,7 +3,8 @@
 Planes differ by what a workshop leaves: ends by up to 3 %, bending stiffness by up to 0.6 % to
 either side, in axes that are those of the sensors or lie anywhere. So modes come in pairs 0 to
 0.6 % apart, which no hit tells apart. Sensors are turned by a degree and off by 0.5 % (both
-standard deviations); the first may be turned by more. The motion is the sum of the modes of `bars`, driven by half sines.
+standard deviations); the first may be turned by more. The motion is the sum of the modes of `bars`,
+driven by half sines.
 """
 
 from __future__ import annotations

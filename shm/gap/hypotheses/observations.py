@@ -36,7 +36,6 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_READINGS = 2  # of one there is no difference
-_OWN_TURN = 0.5  # judgement: of a turn by coupling; the rest is one axis of all modes
 
 
 @dataclass(frozen=True)
@@ -221,8 +220,9 @@ def turn_of_axes(test: ModalTest, hanger: Hanger) -> FloatArray:
     distance = np.interp([mode.order for mode in test.modes], orders, apart)[:, None]
     assumed = hanger.assumptions
     by_bending = np.array([_bending_share(mode, hanger) / 2 for mode in test.modes])
-    coupling = np.outer(np.ones(len(by_bending)), [_OWN_TURN, math.sqrt(1 - _OWN_TURN**2), 0.0])
-    coupling *= assumed.plane_coupling.value
+    own = assumed.plane_coupling_own.value
+    shares = np.outer(np.ones(len(by_bending)), [own, math.sqrt(1 - own**2), 0.0])
+    coupling = assumed.plane_coupling.value * shares
     coupling[:, 2] = assumed.out_of_round_sd.value * by_bending
     least = np.maximum(coupling / (np.pi / 2), np.finfo(float).tiny)  # a right angle is any
     turn = coupling / np.maximum(distance, least)
