@@ -18,7 +18,7 @@ from shm.store.alerts import (
     list_alert_page,
     resolve,
 )
-from shm.store.tests import list_test_rows
+from shm.store.tests import find_neighbours, list_test_rows
 from shm.store.watch import find_latest_watches
 from tests.helpers.entering import identified, selected, updated
 from tests.helpers.nouns import NOW, a_change, a_watched_test, an_alert
@@ -51,6 +51,18 @@ def questions(store: Store) -> Iterator[list[str]]:
 
 def latest_of_each(watches: tuple[StoredWatch, ...]) -> dict[int, int]:
     return {each.hanger: each.id for each in watches}
+
+
+def test_neighbours_of_a_test_are_of_its_hanger_by_time(file_store: Store) -> None:
+    """Not by when they came, and at one time by when they came."""
+    last, first, also_first = (
+        identified(file_store, n, days=days, name=name)
+        for n, days, name in ((1, 9, "last"), (2, 2, "first"), (3, 2, "also first"))
+    )
+    identified(file_store, 4, days=5, hanger=4)
+    assert find_neighbours(file_store, first) == (None, "also first")
+    assert find_neighbours(file_store, also_first) == ("first", "last")
+    assert find_neighbours(file_store, last) == ("also first", None)
 
 
 def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:

@@ -107,6 +107,12 @@ def test_what_is_no_second_test_of_a_shift_is_not_told(newest: ModalTest, beside
     assert told(newest, beside) is None
 
 
+def test_what_an_earlier_visit_showed_is_not_new() -> None:
+    earlier = replace(a_test(1), time=BEGIN - timedelta(days=30))
+    assert told(a_test(3), came(a_test(2))) is not None
+    assert told(a_test(3), came(a_test(2), earlier)) is None
+
+
 def test_a_held_test_is_named_as_one() -> None:
     alert = told(a_test(2), replace(came(a_test(1)), held=["t1"]))
     assert alert is not None
