@@ -65,7 +65,7 @@ _ALONE = timedelta(minutes=10)  # whoever writes a sidecar first writes its file
 
 _LOOKED_AT = 100  # technical: the latest files, which takes a blink; a lost disk has lost all
 _FAILED = "Nothing is taken in meanwhile: mend what it names; its log tells more."
-_BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
+_START = "Start it: `shm daemon`, or the service (docs/operation.md)."
 _CLOCK_TOLERANCE = timedelta(minutes=1)
 _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 
@@ -138,7 +138,7 @@ def check_daemon(examined: DoctorContext) -> Iterator[Finding]:
         else f"last seen {duration_words(timedelta(seconds=ago_s))} ago"
     )
     if holder is None:
-        yield warning("daemon", f"none is active, {seen}", _BEGIN)
+        yield warning("daemon", f"none is active, {seen}", _START)
     elif ago_s is None or ago_s > patience_s(workspace):
         yield warning(
             "daemon",
