@@ -84,7 +84,7 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
         raise BadInput(f"cannot be read: {error}.", file=path, remedy="Check the path.") from error
     except (ValueError, RecursionError) as error:
         # No text, a number of thousands of digits, or nested without end.
-        raise BadInput(f"cannot be read: {error}.", file=path, remedy="Write it anew.") from error
+        raise BadInput(f"cannot be read: {error}.", file=path, remedy="Write it again.") from error
     return parse_modes(document, path)
 
 

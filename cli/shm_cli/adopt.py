@@ -27,7 +27,7 @@ from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
     shell_complete=completion.effects,
     help="May be given twice.",
 )
-@click.option("--at", multiple=True, show_default="likeliest of the diagnosis", help="Where.")
+@click.option("--at", multiple=True, show_default="most probable of the diagnosis", help="Where.")
 @click.option(
     "--baseline",
     default="",

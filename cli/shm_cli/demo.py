@@ -266,9 +266,9 @@ _DAEMON_LIMIT_S = 1800.0  # technical: several times what a slow machine takes
 def command(folder: Path, live: bool) -> None:
     """Run everything on a simulated bridge of 20 hangers.
 
-    A season of hammer tests is dropped into the spool of a running daemon; hanger 7 loses 8 % of
-    its tension; the alert fires; the reports are written. Nothing of hanger 18 is simulated: its
-    one test is the frequencies that were measured for the thesis.
+    A season of hammer tests is dropped into the spool of a running daemon. Hanger 7 loses 8 % of
+    its tension, an alert is raised, and its report and that of hanger 18 are written. Hanger 18
+    is real: its one test holds the frequencies that were measured for the thesis.
 
     \b
     Example: shm demo --folder /tmp/demo

@@ -79,8 +79,8 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
         _show(shown)
     for each in rebaselined:
         sentence = (
-            f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has come "
-            "in after that baseline was set."
+            f"Hanger {each.hanger} has a new baseline ({each.since:%Y-%m-%d}); no test has come in "
+            "since it was set."
         )
         click.echo(paragraph(sentence))
     if states is not None and states.temperature_coefficients:

@@ -194,8 +194,9 @@ baseline = click.option(
     "--baseline",
     metavar="NAME",
     default="",
+    show_default="the beam that these data prefer",
     shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.  [default: the beam that these data prefer]",
+    help="The model class whose gap is diagnosed.",
 )
 latest = click.option(
     "--tests",

@@ -165,7 +165,7 @@ def _in_panels(group: click.Group) -> click.Group:
 @click.version_option(__version__, prog_name="shm")
 @click.pass_context
 def cli(ctx: click.Context, workspace: str, debug: bool) -> None:
-    """Tension of bridge hangers from hammer tests, with its uncertainty, unattended.
+    """Infer the tension of bridge hangers from hammer tests or permanent sensors, unattended.
 
     \b
     Example: shm --workspace arch report --hanger 3

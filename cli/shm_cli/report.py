@@ -152,7 +152,10 @@ def _refuse_unclear(
     hanger_id: int | None, of_bridge: bool, test_id: str | None, since: str | None
 ) -> None:
     if (hanger_id is None) != of_bridge:
-        raise UsageError("a report of what?", remedy="Give either --hanger N or --bridge.")
+        raise UsageError(
+            "a report is of a hanger or of the bridge.",
+            remedy="Give either --hanger N or --bridge.",
+        )
     if of_bridge and test_id is not None:
         raise UsageError("a test is of one hanger.", remedy="Give --hanger N with --test.")
     if test_id is not None and since is not None:

@@ -64,8 +64,8 @@ _FORGOTTEN = timedelta(days=1)  # some uploads take hours
 _ALONE = timedelta(minutes=10)  # whoever writes a sidecar first writes its file soon
 
 _LOOKED_AT = 100  # technical: the latest files, which takes a blink; a lost disk has lost all
-_FAILED = "Nothing is taken in meanwhile: mend what it names; its log tells more."
-_BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
+_FAILED = "No file is processed until you fix what it names; see its log."
+_START = "Start it: `shm daemon`, or the service (docs/operation.md)."
 _CLOCK_TOLERANCE = timedelta(minutes=1)
 _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 
@@ -138,7 +138,7 @@ def check_daemon(examined: DoctorContext) -> Iterator[Finding]:
         else f"last seen {duration_words(timedelta(seconds=ago_s))} ago"
     )
     if holder is None:
-        yield warning("daemon", f"none is active, {seen}", _BEGIN)
+        yield warning("daemon", f"none is active, {seen}", _START)
     elif ago_s is None or ago_s > patience_s(workspace):
         yield warning(
             "daemon",
@@ -433,7 +433,7 @@ _REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator
 def check_hooks(workspace: Workspace) -> Iterator[Finding]:
     """Check whether the described hooks could be run; nothing is sent. Needs no store."""
     if not workspace.bridge.hooks:
-        yield warning("hooks", "none is described: nobody is told of alerts", "See docs/alerts.md.")
+        yield warning("hooks", "none is described: nobody receives alerts", "See docs/alerts.md.")
     timeout_s = workspace.settings.hook_timeout_seconds
     notifier = HookNotifier(workspace.folder, timeout_s, os.environ)
     try:
@@ -527,7 +527,7 @@ def check_deliveries(examined: DoctorContext) -> Iterator[Finding]:
             "deliveries",
             f"{len(lost)} were given up in the last {duration_words(_REMEMBERED)}; {last.hook}: "
             f"{last.last_error}",
-            "See `shm alerts` for what nobody was told of, and mend the hook.",
+            "`shm alerts` lists them. Fix the hook, then run `shm alerts resend NUMBER`.",
         )
     if not late and not lost:
         yield ok("deliveries", f"{len(waiting)} pending" if waiting else "none due")

@@ -24,7 +24,7 @@ from shm.api.arguments import (
     check_tests,
 )
 from shm.api.in_python import in_python
-from shm.api.placing import Places, Planes, with_places
+from shm.api.placing import Places, Planes, Units, check_units, with_places
 from shm.api.stored import Store
 from shm.bridge.hanger import hanger_of
 from shm.errors import BadInput, UsageError, check_count
@@ -73,13 +73,14 @@ __all__ = [
 
 
 def read(
-    path: str | Path, *, planes: Planes = None, places_m: Places = None
+    path: str | Path, *, planes: Planes = None, places_m: Places = None, units: Units = None
 ) -> Recording | FrequencyResponse:
     """Return the content of one file, in SI units, gaps as NaN.
 
     CSV, UFF58, HDF5, MATLAB, TDMS, miniSEED or npz; a sidecar NAME.toml beside NAME.csv says what
     the file does not. So do `planes` (`transverse`, `longitudinal`) and `places_m`, in m from the
-    deck end: by the names of channels, or one for all accelerations; they override the file.
+    deck end: by the names of channels, or one for all accelerations; and `units` by the names of
+    channels, as `{"force": "kN", "acc_1": "g"}`. They override file and sidecar.
     Time histories are a Recording, frequency responses a FrequencyResponse. Raises BadInput naming
     file, line, channel and remedy, and UsageError for a channel that the file does not have. A
     .zip holds several files of one test: `shm.read.read_test` gives them all.
@@ -90,7 +91,8 @@ def read(
         ['force', 'acc_1', 'acc_2']
     """
     with in_python():
-        return with_places(read_file(Path(path)), planes, places_m)
+        check_units(units)
+        return with_places(read_file(Path(path), units), planes, places_m)
 
 
 def from_sep005(

@@ -18,7 +18,7 @@ _CALLS: tuple[tuple[str, str], ...] = (
     (r", or say it once for this logger: `shm import FILE`", ""),
     (
         r"`?shm import FILE`?( asks for it and keeps it for all files of this logger)?",
-        "shm.read(path, planes=..., places_m=...)",
+        "shm.read(path, units=..., planes=..., places_m=...)",
     ),
     (r"`shm gap diagnose[^`]*`", "shm.diagnose(tests, hanger)"),
     (r"`shm gap check[^`]*`", "shm.check_gap(tests, hanger)"),
@@ -29,8 +29,11 @@ _CALLS: tuple[tuple[str, str], ...] = (
     (r"`?(?:shm )?ingest --together`?", "shm.identify([first, second], hanger=hanger)"),
 )
 """Commands in remedies, and what does the same in Python."""
-_IN_A_FILE = re.compile(r"(?=.*\b(planes?|x_m)\b)(?=.*\b(sidecar|header)\b)", re.DOTALL)
-_BY_READ = "In Python: shm.read(path, planes={...}, places_m={...})."
+_BY_READ: tuple[tuple[str, str], ...] = (
+    (r"(?=.*\b(planes?|x_m)\b)(?=.*\b(sidecar|header)\b)", "planes={...}, places_m={...}"),
+    (r"give its unit|Give one of N, |with unit = (?!.*calibration)", "units={...}"),
+)
+"""Faults of a file's description, and the argument of `shm.read` that states it."""
 
 
 @contextmanager
@@ -42,7 +45,8 @@ def in_python() -> Iterator[None]:
         remedy = error.remedy
         for command, call in _CALLS:
             remedy = re.sub(command, lambda _, call=call: call, remedy)  # type: ignore[misc]
-        if _IN_A_FILE.search(remedy):
-            remedy = f"{remedy} {_BY_READ}"
+        for fault, arguments in _BY_READ:
+            if re.search(fault, remedy, re.DOTALL):
+                remedy = f"{remedy} In Python: shm.read(path, {arguments})."
         error.remedy = remedy
         raise

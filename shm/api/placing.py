@@ -13,6 +13,7 @@ from shm.values import Channel, FrequencyResponse, Plane, Recording, ResponsePoi
 
 Planes: TypeAlias = Plane | Mapping[str, Plane] | None
 Places: TypeAlias = float | Mapping[str, float] | None
+Units: TypeAlias = Mapping[str, str] | None
 """By the names of channels, or one for all accelerations."""
 Placed = TypeVar("Placed", Channel, ResponsePoint)
 
@@ -29,6 +30,15 @@ def with_places(
     names = {each.name for each in record.points}
     given = _by_name(names, names, planes, places_m)
     return replace(record, points=_placed(record.points, *given))
+
+
+def check_units(units: object) -> None:
+    """Raise UsageError for units that are not given by the names of channels."""
+    if units is not None and not isinstance(units, Mapping):
+        raise UsageError(
+            f"units is {units!r}, which does not say what belongs to which channel.",
+            remedy='Give them by the names of the channels: units={"force": "kN", "acc_1": "g"}.',
+        )
 
 
 def _by_name(

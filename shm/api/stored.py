@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from shm.api.in_python import in_python
-from shm.errors import NothingThere
+from shm.errors import BadInput, NothingThere
 from shm.read import read_test
 from shm.values import (
     Averaged,
@@ -43,6 +43,14 @@ class Store:
         # The store's libraries take a second to load, and most notebooks open none.
         from shm.store import Workspace
 
+        bridge = Path(workspace) / "bridge.toml"
+        if not bridge.is_file():
+            lacks = "holds no bridge.toml" if bridge.parent.is_dir() else "is no folder"
+            raise BadInput(
+                f"{workspace} {lacks}, so it is no workspace.",
+                remedy='Give the folder that holds bridge.toml: shm.Store("arch"). '
+                "`shm init arch` in a terminal makes one.",
+            )
         with in_python():
             self._workspace = Workspace.described(workspace)
             self._store = self._workspace.store()

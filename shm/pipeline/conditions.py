@@ -147,7 +147,7 @@ def _why_not_called(alert: Alert, found: Evidence) -> str:
         "judged again with the thresholds in force "
         f"(tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
         f"{limits.stiffness_shift_decades:.3g} decades, probability "
-        f"{limits.alert_probability:.3g}): its tests do not call for it as it was told"
+        f"{limits.alert_probability:.3g}): its tests no longer raise it in this form"
     )
 
 
@@ -232,7 +232,7 @@ def _renewed(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) 
         message = message_of(test, hanger, alert.change, beyond, is_call=False, is_further=False)
     since = f" on {end.at:%Y-%m-%d}" if end else ""
     message += (
-        f" Alert {stored.id}, which told of it, was resolved{since}; tests {shown[0].test} and "
+        f" Alert {stored.id}, which reported it, was resolved{since}; tests {shown[0].test} and "
         f"{test.test}, of two visits, show it again."
     )
     renewed = replace(alert, test=test.test, time=test.time, drifts=drifts, message=message)

@@ -450,7 +450,7 @@ class Courier:
         again = not isinstance(error, DeliveryRefused) and attempts < settings.hook_attempts
         next_attempt_at = now + _wait_after(attempts, settings) if again else None
         self._store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
-        end = "" if again else "; given up: nobody is told of it by this hook"
+        end = "" if again else "; given up: this hook does not deliver it"
         text = "hook %s failed on %s: %s%s"
         log.warning(text, delivery.hook, sent.message.key, error, end, extra=sent.log_fields)
 

@@ -355,7 +355,7 @@ def _refusal(deaths: int, how: str) -> ShmError:
     """Return why a recording is given up of which processes died."""
     return ShmError(
         f"{how.removesuffix('.')}; so it went {deaths} times in a row.",
-        remedy="The file is damaged, too large or made to harm: export it anew from its source, or "
-        "split it. Or somebody kills the processes, as an operator or a guard of the memory "
+        remedy="The file is damaged, too large or made to harm: export it again from its source, "
+        "or split it. Or somebody kills the processes, as an operator or a guard of the memory "
         "(`journalctl -k`, earlyoom): find out who, then drop the file again.",
     )

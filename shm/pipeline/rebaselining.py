@@ -78,8 +78,8 @@ class Outcome:
             f"now on: {tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
         ]
         lines += [
-            f"Its tests still show what alert {each.alert} told ({each.words}): from now on that "
-            "is taken for its normal state."
+            f"Its tests still show what alert {each.alert} reported ({each.words}): from now on "
+            "that is taken for its normal state."
             for each in self.accepted
         ]
         lines += [f"Alert {each} is explained by it and resolved." for each in self.explained]
@@ -187,7 +187,7 @@ def _refuse_unrepaired(left: Sequence[Unrepaired], hanger: Hanger, order: Order)
     listed = "; ".join(f"alert {each.alert}: {each.words}" for each in left)
     raise BadInput(
         f"hanger {hanger.id} is not {order.kind.name} by its tests since {order.since:%Y-%m-%d}: "
-        f"against the baseline of before there still stands {listed}. Nothing was changed.",
+        f"against the former baseline there is still {listed}. Nothing was changed.",
         remedy="Test it after the works and give their day as --since. If it is to stay so, say "
         '--kind "accepted as it is".',
     )

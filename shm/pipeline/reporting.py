@@ -335,7 +335,7 @@ def modal_test_report(
     options = identify_options(workspace.settings, workspace.bridge)
     found = identify(records, options, test_id=name, hanger=hanger)
     if identify_lineage(recording, hanger_id, workspace) != stored.lineage:
-        note = "identified anew: settings, description or version differ from those of the store"
+        note = "identified again: settings, description or version differ from those of the store"
         found = replace(found, notes=(*found.notes, note))
     return ModalTestReport(
         found,

@@ -340,7 +340,7 @@ def _response(found: Description) -> FrequencyResponse:
         raise BadInput(
             "a coherence lies far outside 0 to 1.",
             file=path,
-            remedy="Export the coherence anew, or leave it out.",
+            remedy="Export the coherence again, or leave it out.",
         )
     return FrequencyResponse(
         found.table.source,

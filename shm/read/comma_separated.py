@@ -150,7 +150,7 @@ class _Text:
             nameless = sum(name.startswith("point_") for name in places) + (part == "real")
             parts = places.setdefault(found[1] or f"point_{nameless}", {})
             if part in parts:
-                raise self._no_response(f"the column {column!r} stands twice")
+                raise self._no_response(f"the column {column!r} occurs twice")
             parts[part] = place
         if not all({"real", "imaginary"} <= set(parts) for parts in places.values()):
             raise self._no_response("a real or an imaginary part is missing")
@@ -162,7 +162,7 @@ class _Text:
             raise self._refusal("the names of the columns are missing", remedy, self.at)
         for name in self.names:
             if not name or self.names.count(name) > 1:
-                what = f"the column name {name!r} stands twice" if name else "a column has no name"
+                what = f"the column name {name!r} occurs twice" if name else "a column has no name"
                 raise self._refusal(what, "Give each column its own name", self.at, name)
 
     def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:

@@ -50,7 +50,7 @@ _CHUNK = 1 << 20
 _ENCRYPTED = 0x1
 FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
 _ARCHIVES = (".zip", ".tar", ".tgz", ".7z", ".rar", ".bz2", ".xz", ".zst")
-_PACK_AGAIN = "Pack the plain files of one test anew."
+_PACK_AGAIN = "Pack the plain files of one test again."
 
 
 def head_of(path: Path) -> bytes:
@@ -106,7 +106,7 @@ def refuse_unless_readable(
         )
     what = f"holds {known}" if known else "does not hold what its name says"
     raise BadInput(
-        f"{what}, not {claimed.name}.", file=path, remedy=f"Export it anew as {claimed.name}."
+        f"{what}, not {claimed.name}.", file=path, remedy=f"Export it again as {claimed.name}."
     )
 
 
@@ -270,7 +270,7 @@ def _refuse_member(member: zipfile.ZipInfo, seen: set[str], path: Path) -> None:
         "is a link or a device": bool(mode) and stat.S_IFMT(mode) not in (0, stat.S_IFREG),
         "is encrypted": bool(member.flag_bits & _ENCRYPTED),
         "is an archive itself": name.lower().endswith(_ARCHIVES),
-        "stands twice in it": name in seen,
+        "occurs twice in it": name in seen,
     }
     for what, at_fault in faults.items():
         if at_fault:

@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from shm.errors import UsageError
 from shm.read import logger_words as words
 from shm.read.header import Entry, Header
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.table import Column, Description, Role, Table
 
 
-def describe(table: Table, *, with_sidecars: bool = True) -> Description:
-    """Return the table with what its sidecar says; raises BadInput where that is faulty."""
+def describe(
+    table: Table, *, with_sidecars: bool = True, units: Mapping[str, str] | None = None
+) -> Description:
+    """Return the table with what its sidecar says; raises BadInput where that is faulty.
+
+    `units` by the names of columns override file and sidecar; raises UsageError for another name.
+    """
     in_sidecar = channels_described(table.path) if with_sidecars else {}
+    given = _by_column(units or {}, table)
+    in_sidecar |= {name: {**in_sidecar.get(name, {}), **entry} for name, entry in given.items()}
     roles = {column.name: role_of(column, in_sidecar.get(column.name)) for column in table.columns}
     channels, responses = (
         [column for column in table.columns if roles[column.name] == role]
@@ -28,6 +36,7 @@ def describe(table: Table, *, with_sidecars: bool = True) -> Description:
     if with_sidecars:
         known = [*(column.name for column in others), *table.left_out]
         header = with_sidecar(header, table.path, known)
+    header = header.merged_with(Header(table.path, given))
     out = [column for column in found if header.leaves_out(column.name)]
     used = tuple(column for column in found if column not in out)
     size = next((column.size for column in used or table.choosable), 0)
@@ -52,6 +61,17 @@ def describe(table: Table, *, with_sidecars: bool = True) -> Description:
         frequencies,
         (*named, *table.left_out, *(column.name for column in out)),
     )
+
+
+def _by_column(units: Mapping[str, str], table: Table) -> dict[str, dict[str, Entry]]:
+    names = [column.name for column in table.columns]
+    for name in units:
+        if name not in names:
+            raise UsageError(
+                f"units names the channel {name!r}, which the file does not have.",
+                remedy=f"Its channels are {', '.join(names)}.",
+            )
+    return {name: {"unit": Entry(unit, table.path)} for name, unit in units.items()}
 
 
 def role_of(column: Column, described: Mapping[str, Entry] | None) -> Role:

@@ -223,7 +223,7 @@ def _arrays(path: Path) -> Arrays:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise BadInput(
-            "stands twice in the file.",
+            "occurs twice in the file.",
             file=path,
             channel=twice,
             remedy="Save each variable once.",

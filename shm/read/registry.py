@@ -106,9 +106,13 @@ def _sheets(path: Path) -> tuple[str, Path, tuple[str, ...]]:
     return text, path, preamble
 
 
-def read(path: Path) -> Recording | FrequencyResponse:
-    """Return the content of a file; raises BadInput naming file, line, channel and remedy."""
-    found = _records(path)
+def read(path: Path, units: Mapping[str, str] | None = None) -> Recording | FrequencyResponse:
+    """Return the content of a file; raises BadInput naming file, line, channel and remedy.
+
+    `units` by the names of channels override what file and sidecar say.
+    """
+    with format_of(path).open_tables(path) as tables:
+        found = [_assembled(table, units) for table in tables]
     if len(found) > 1:
         raise BadInput(
             f"holds {len(found)} records, as of the hits of one test, where one is read.",
@@ -123,10 +127,12 @@ def _records(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
         return tuple(map(_assembled, tables))
 
 
-def _assembled(table: Table) -> Recording | FrequencyResponse:
+def _assembled(
+    table: Table, units: Mapping[str, str] | None = None
+) -> Recording | FrequencyResponse:
     if table.refusal is not None:
         raise table.refusal
-    return assemble(describe(table))
+    return assemble(describe(table, units=units))
 
 
 def peek(path: Path) -> Peek:

@@ -92,7 +92,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
                 f"it is no sound JSON: {error.msg} at column {error.colno}.",
                 file=path,
                 line=error.lineno,
-                remedy="Write it anew; a sample that is missing is null.",
+                remedy="Write it again; a sample that is missing is null.",
             ) from None
     if isinstance(listed, Mapping) and "data" in listed:
         listed = [listed]

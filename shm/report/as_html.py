@@ -12,6 +12,7 @@ from jinja2 import BaseLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from shm.report.paper import Paper, Table
+from shm.values.rounding import unbroken
 
 _COMMAND = re.compile(r"`([^`]+)`")
 _CODE = Markup("<code>{}</code>")
@@ -32,7 +33,7 @@ def with_code(text: str) -> Markup:
     """Return the text for a page; what stands between backticks, as commands do, is code."""
     return Markup().join(
         _CODE.format(part) if index % 2 else escape(part)
-        for index, part in enumerate(_COMMAND.split(text))
+        for index, part in enumerate(_COMMAND.split(unbroken(text)))
     )
 
 

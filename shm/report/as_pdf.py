@@ -40,6 +40,7 @@ from reportlab.platypus import Table as SetTable
 from shm.report.figures.specification import Illustration
 from shm.report.figures.style import GRID, INK, QUIET, STATUS_COLOURS, VERDICT_COLOURS
 from shm.report.paper import Fact, Paper, Section, Table
+from shm.values.rounding import unbroken
 
 # Layout of an A4 page, in points unless it says mm: margins for a binder, type that reads on paper.
 WIDTH = 174 * mm
@@ -168,7 +169,7 @@ def _cut(text: str) -> str:
 
 def _words(text: str) -> str:
     """Return a text for a paragraph, without the backticks around commands."""
-    return escape(text.replace("`", ""))
+    return escape(unbroken(text.replace("`", "")))
 
 
 def _flowables(paper: Paper) -> list[Flowable]:

@@ -155,7 +155,7 @@ def _causes(diagnosis: BridgeDiagnosis) -> Table:
         ("something not in the catalogue, shared", diagnosis.unknown_probability),
     )
     return Table(
-        "Causes in common, likeliest first",
+        "Causes in common, most probable first",
         ("cause", "probability", "group", "log Bayes factor", "family (members)"),
         (*rows, *((what, formatting.probability(share), "", "", "") for what, share in rest)),
         note=(

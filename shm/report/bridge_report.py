@@ -93,7 +93,7 @@ def facts(data: BridgeReport) -> tuple[Fact, ...]:
         ("Hangers", str(len(data.hangers)), f"{len(tested)} of them tested"),
         ("In alert", str(len(alert)), named(alert) if alert else "no hanger"),
         ("To watch", str(len(watch)), named(watch) if watch else "no hanger"),
-        ("Open alerts", str(opened), "nobody took note of them yet" if opened else "none waits"),
+        ("Open alerts", str(opened), "not acknowledged yet" if opened else "none waits"),
         (
             "Latest test",
             f"{latest:%Y-%m-%d}" if latest else "none",

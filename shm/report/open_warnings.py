@@ -73,10 +73,10 @@ def open_warnings(
 
 
 def passed_over(hanger: Hanger, window: str) -> str:
-    """Return that the newest test was compared with nothing: it is in a maintenance `window`."""
+    """Return that the newest test was not compared: it is in a maintenance `window`."""
     return (
-        f"Hanger {hanger.id}: its latest test was made in a maintenance window and is compared "
-        f"with nothing. Test it again {WEEK} of the end of the works. Until then nobody knows "
+        f"Hanger {hanger.id}: its latest test was made in a maintenance window and is not compared "
+        f"with the baseline. Test it again {WEEK} of the end of the works. Until then nobody knows "
         f"whether it changed ({window})."
     )
 

@@ -483,9 +483,9 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
 def describe_silence(silence: Silence) -> str:
     """A silence or a maintenance window in words: what it keeps from whom, until when, and why."""
     of = hangers_of(silence.hanger)
-    effect = f"hooks are told nothing of {of}"
+    effect = f"hooks receive nothing about {of}"
     if silence.is_maintenance:
-        effect = f"tests of {of} are compared with nothing, and hooks told nothing of it,"
+        effect = f"tests of {of} are not compared with the baseline, and hooks receive nothing,"
     return (
         f"{kind_of(silence)} {silence.id}: {effect} until {silence.until:%Y-%m-%d %H:%M} UTC "
         f"({silence.who}: {silence.why})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -96,6 +97,14 @@ def rounded(value: float, half: float, sign: str = "", most_decimals: int = 6) -
     value, half = round(value, places), round(half, places)
     shown = max(places, 0)
     return f"{value:{sign}z.{shown}f} ± {half:.{shown}f}"
+
+
+_ERROR = re.compile(r"± ([\d.,]+) ")
+
+
+def unbroken(text: str) -> str:
+    """Return a text whose `± 2.7 %` stays on one line; a page may break before the `±`."""
+    return _ERROR.sub("±\N{NO-BREAK SPACE}\\1\N{NO-BREAK SPACE}", text)
 
 
 def to_two_digits(value: float, half: float, sign: str = "") -> str:

@@ -42,7 +42,7 @@ REFUSED: tuple[tuple[Call, type[ShmError], str, str], ...] = (
     (lambda _: shm.load_hanger("nope.toml"), BadInput, "nope.toml: no such file", "shm.round_bar("),
     (lambda p: shm.load_hanger(_two_hangers(p)), BadInput, "2 [[hanger]]", "load_hanger(path, 3)"),
     (lambda p: shm.read(_without_units(p)), BadInput, "no channel holds", 'unit = "m/s2".'),
-    (lambda _: shm.Store("/nonexistent"), BadInput, "no such file in /nonexistent", "a folder"),
+    (lambda _: shm.Store("/nonexistent"), BadInput, "/nonexistent is no folder", "shm.Store("),
     (lambda p: shm.identify(str(p)), UsageError, "records holds", "shm.identify(shm.read(path))"),  # type: ignore[arg-type]
     (lambda p: shm.identify([p]), UsageError, "records holds", "shm.identify(shm.read(path))"),  # type: ignore[list-item]
     (lambda _: shm.identify([]), UsageError, "no record", "at least one"),

@@ -35,11 +35,32 @@ def test_planes_and_places_override_the_file(path: Path) -> None:
     assert [e.x_m for e in moved.accelerations[1:]] == [e.x_m for e in before.accelerations[1:]]
 
 
+def test_units_override_the_file(path: Path, tmp_path: Path) -> None:
+    before = shm.read(path)
+    given = shm.read(path, units={"force": "kN", "acc_1": "g"})
+    assert isinstance(before, shm.Recording)
+    assert isinstance(given, shm.Recording)
+    scales = [
+        float(new.values.max() / old.values.max())
+        for new, old in zip(given.channels[:3], before.channels[:3], strict=True)
+    ]
+    assert scales == pytest.approx([1000.0, 9.80665, 1.0])
+    plain = tmp_path / "plain.csv"
+    plain.write_text("Zeit;Kraft;Besch1\n" + "".join(f"{i / 512};1;2\n" for i in range(60)))
+    with pytest.raises(BadInput, match=r"shm.read\(path, units=\{...\}\)"):
+        shm.read(plain)
+    read = shm.read(plain, units={"Kraft": "kN", "Besch1": "g"}, places_m={"Besch1": 2.5})
+    assert isinstance(read, shm.Recording)
+    assert [each.quantity for each in read.channels] == ["force", "acceleration"]
+
+
 def test_a_channel_plane_or_file_that_is_not_there_is_refused(path: Path) -> None:
     for given, said in (
         ({"planes": {"acc_9": "transverse"}}, "'acc_9', which the file does not have"),
         ({"places_m": {"acc_9": 1.0}}, "'acc_9', which the file does not have"),
         ({"planes": "vertical"}, "'vertical' is no plane"),
+        ({"units": {"acc_9": "g"}}, "'acc_9', which the file does not have.* acc_1"),
+        ({"units": "g"}, 'units={"force": "kN"'),
     ):
         with pytest.raises(UsageError, match=said):
             shm.read(path, **given)  # type: ignore[arg-type]

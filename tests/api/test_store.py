@@ -110,6 +110,7 @@ def test_what_is_not_there_yet_says_so(bridge: Workspace) -> None:
 
 
 def test_a_folder_that_is_no_workspace_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"bridge.toml: no such file"):
-        shm.Store(tmp_path)
+    for folder, lacks in ((tmp_path, "holds no bridge.toml"), (tmp_path / "none", "is no folder")):
+        with pytest.raises(BadInput, match=rf"^{folder} {lacks}, .*shm\.Store\("):
+            shm.Store(folder)
     assert list(tmp_path.iterdir()) == []

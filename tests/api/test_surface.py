@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 SIGNATURES = {
     "from_sep005": "(channels, *, hanger=None)",
-    "read": "(path, *, planes=None, places_m=None)",
+    "read": "(path, *, planes=None, places_m=None, units=None)",
     "load_modes": "(path)",
     "load_hanger": "(path, hanger_id=None)",
     "round_bar": "(id, *, diameter_m, length_m, elastic_modulus_pa, density_kg_m3, "

@@ -77,15 +77,14 @@ def test_a_hanger_is_compared_anew_from_a_day_on(on_copy: Shm, copied: Workspace
     """After it the shift from the old baseline is shown no more."""
     told = on_copy.told(f"{REBASELINE} 2026-06-30")
     assert told.startswith("Hanger 3 is compared with its one test since 2026-06-30 from now on: 5")
-    assert "Its tests still show what alert 2 told (tension fell by 20" in told
+    assert "Its tests still show what alert 2 reported (tension fell by 20" in told
     assert "still open" not in told, "resolved, and so open no more"
     with copied.store() as store:
         baseline = store.watch.baseline(3)
     assert baseline is not None
     assert baseline.posterior.tests == ("t2",)
     assert on_copy("drift").told == (
-        "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "
-        "set."
+        "Hanger 3 has a new baseline (2026-06-30); no test has come in since it was set."
     )
     report = on_copy.json("report --hanger 3")
     assert report["drifts"] == []

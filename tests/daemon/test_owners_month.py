@@ -99,7 +99,7 @@ def test_a_month_needs_no_shell(month: tuple[Page, Workspace, str], tmp_path: Pa
     silences.get_by_label("Until, UTC").fill(f"{utc_now() + timedelta(days=2):%Y-%m-%dT%H:%M}")
     silences.get_by_label("Why").fill("The clamp is replaced.")
     silences.get_by_role("button", name="Start silence").click()
-    expect(silences.get_by_text("hooks are told nothing of hanger 3")).to_be_visible()
+    expect(silences.get_by_text("hooks receive nothing about hanger 3")).to_be_visible()
     whole(page)
     silences.get_by_role("button", name="End silence").click()
     expect(silences.get_by_text("Notifications are on for all hangers.")).to_be_visible()

@@ -227,14 +227,14 @@ def test_silence_is_shown_until_its_end(browser: httpx.Client, workspace: Worksp
     assert (made.status_code, made.headers["location"]) == (303, "/alerts#silences")
     later = {"hanger": "all", "from": in_days(3), "until": in_days(4), "maintenance": "true"}
     browser.post("/silences", data={**asked, **later})
-    told = "Silence 1: hooks are told nothing of hanger 3 until"
+    told = "Silence 1: hooks receive nothing about hanger 3 until"
     page = browser.get("/").text
     assert told in page
     assert "new &lt;joint&gt;" in page
     assert "all hangers" not in page  # which is to come
     page = browser.get("/alerts").text
     assert "Silences and maintenance (2)" in page
-    assert "Maintenance window 2: tests of all hangers are compared with nothing" in page
+    assert "Maintenance window 2: tests of all hangers are not compared with the baseline" in page
     assert browser.post("/silences/1/end").status_code == 303
     assert told not in browser.get("/").text
     assert browser.post("/silences/1/end").status_code == 409

@@ -56,7 +56,7 @@ def test_operator_has_gap_diagnosed(browser: httpx.Client, bridge: Workspace) ->
     assert kept is not None
     assert kept.diagnosis.tests == ("t0", "t4", "t5", "t6")  # before the loss, too; t1 is as t0
     shown = browser.get("/hangers/3").text
-    assert "Diagnose anew" in shown
+    assert "Diagnose again" in shown
     summary = found.text.partition("<p>")[2].partition("</p>")[0]
     assert summary.split(". ")[0] in shown
 

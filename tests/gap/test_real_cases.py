@@ -58,6 +58,6 @@ def test_a_slip_among_good_points_is_no_effect(data: Path) -> None:
     assert slip.probability > 0.9
     assert slip.expected_hz == pytest.approx(66.4, abs=2.0)
     (remarked,) = [each for each in found.remarks if "gross error" in each]
-    assert "of test 50 N, 80.2 Hz, is set aside" in remarked
+    assert "of test 50 N, 80.2 Hz, is excluded" in remarked
     assert not [each for each in found.remarks if "contradict" in each]
     assert max(cause.probability for cause in found.causes) < 0.5

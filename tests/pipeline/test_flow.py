@@ -303,7 +303,7 @@ def test_a_file_that_kills_its_worker_is_tried_again_alone_and_then_refused(
     assert list(stages(workspace).values()) == [Stage.REFUSED, Stage.DONE, Stage.DONE]
     reason = json.loads((workspace.folder / "quarantine/bad.modes.json.reason.json").read_text())
     assert reason["message"] == "the process that worked on it died; so it went 6 times in a row."
-    assert "export it anew" in reason["remedy"]
+    assert "export it again" in reason["remedy"]
 
 
 class Killed(ThreadPoolExecutor):

@@ -41,7 +41,7 @@ def test_a_test_of_a_maintenance_window_leaves_the_hanger_unknown(
     ingest(workspace)
     found = message(workspace)
     assert found.status is Status.CHECK
-    assert found.lead.state.endswith("in a maintenance window and is compared with nothing.")
+    assert found.lead.state.endswith("and is not compared with the baseline.")
     assert found.urgency == "week"
 
 

@@ -123,7 +123,7 @@ def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
         (again,) = (each for each in store.alerts.list_all() if each.alert.key == anew)
     assert again.resolution is None
     assert again.alert.kinds == raised.alert.kinds
-    assert f"Alert {raised.id}, which told of it, was resolved on" in again.alert.message
+    assert f"Alert {raised.id}, which reported it, was resolved on" in again.alert.message
     assert "of two visits, show it again" in again.alert.message
 
 

@@ -91,7 +91,7 @@ def test_rounded_frequencies_lie_on_the_grid_that_they_mean(tmp_path: Path) -> N
     ("text", "words"),
     [
         (f"frequency,magnitude,phase\n{rows()}", "'magnitude' is no part of a response"),
-        (f"frequency,a_real,a_imag,a_re\n{rows(4)}", "'a_re' stands twice"),
+        (f"frequency,a_real,a_imag,a_re\n{rows(4)}", "'a_re' occurs twice"),
         (f"frequency,a_real,b_imaginary\n{rows()}", "a real or an imaginary part is missing"),
         (f"frequency,real,imaginary\n{rows()}0.3,1,2\n", "even grid"),
         (f"frequency,real,imaginary\n{rows(step=-1.0)}", "even grid"),

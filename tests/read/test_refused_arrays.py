@@ -181,7 +181,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
         "acc_1: holds 1x400000000 values, beyond the 256 MB",
     ),
     "mat with a variable twice": (
-        lambda f: with_bytes(mat(f), lambda b: b + b[128:]), "stands twice in the file",
+        lambda f: with_bytes(mat(f), lambda b: b + b[128:]), "occurs twice in the file",
     ),
     "mat of version 4": (
         lambda f: mat(f, version="4"), "does not hold what its name says, not MATLAB",

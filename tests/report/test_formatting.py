@@ -10,7 +10,7 @@ import pytest
 
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.values.rounding import force_unit
+from shm.values.rounding import force_unit, unbroken
 from tests.helpers.nouns import a_posterior
 
 KILONEWTON = force_unit(1e5)
@@ -28,6 +28,8 @@ WIDE = Interval(469.3e3, 317.2e3, 711.4e3)
         (formatting.with_interval(Interval(3200.0, 1000.0, 9000.0), "kN"),
          "3200 kN (90 % interval 1000 to 9000 kN)"),
         (formatting.with_half(WIDE, KILONEWTON), "470 ± 200 kN"),
+        (unbroken("by 7.2 ± 2.0 % (90 % interval)"),
+         "by 7.2 ±\N{NO-BREAK SPACE}2.0\N{NO-BREAK SPACE}% (90 % interval)"),
         (formatting.tension(WIDE, KILONEWTON), "470 kN (90 % interval 320 to 710 kN)"),
         (formatting.signed_percent(Interval(-0.0804, -0.0991, -0.0612)),
          "-8.0 % (90 % interval -9.9 to -6.1 %)"),

@@ -160,8 +160,8 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
         "Hanger 3: tension fell by 8.2 ± 1.1 %. Repeat the hammer test within a week; if the loss "
         "stays, inspect its anchorages and the rod, and compare the hangers beside it (`shm drift "
         "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. Details: ± is half "
-        "the 90 % interval. The probability of any change, by the change detector, is 0.90. The "
-        "mean time between false alarms is at least 200 years."
+        "the 90 % interval. The probability of any change, which allows for disturbed visits, is "
+        "0.90. The mean time between false alarms is at least 200 years."
     )
 
 
@@ -220,7 +220,7 @@ def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None
     assert beyond.change == replace(call.change, probability=0.99)
     assert beyond.message.endswith(
         "The probability that tension is beyond its threshold of 5 % is 0.97. "
-        "The probability of any change, by the change detector, is 0.99."
+        "The probability of any change, which allows for disturbed visits, is 0.99."
     )
     assert "between 2026-04-30 and 2026-05-03" in beyond.message
     assert "k3" not in beyond.message
@@ -234,7 +234,7 @@ def test_a_message_gives_the_probabilities_of_its_document() -> None:
     assert (alert.change.probability, alert.drifts[0].probability) == (0.94, 0.999)
     assert (
         "The probability that tension is beyond its threshold of 5 % is above 0.99. "
-        "The probability of any change, by the change detector, is 0.94."
+        "The probability of any change, which allows for disturbed visits, is 0.94."
     ) in alert.message
 
 

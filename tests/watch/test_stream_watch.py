@@ -309,7 +309,7 @@ def test_it_goes_on_from_bytes_as_it_would_have() -> None:
 
 def test_what_it_cannot_read_or_watch_is_said() -> None:
     reading = hours(1)[0]
-    with pytest.raises(BadInput, match="the watch then begins anew"):
+    with pytest.raises(BadInput, match="the watch then starts again"):
         watch_reading(None, reading, HANGER, b"{}\n")
     with pytest.raises(BadInput, match="no model"):
         watch_reading(None, reading, Hanger.without_model(7), None)

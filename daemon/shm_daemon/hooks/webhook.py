@@ -80,7 +80,7 @@ def _failure(hook: WebhookHook, error: NoAnswer, *, is_closed: bool) -> HookFail
     if error.is_untrusted:
         return HookFailed(
             f"{hook.host} cannot show that it is who it says ({error.reason}).",
-            remedy="Have its certificate mended.",
+            remedy="Have its certificate renewed.",
         )
     if error.is_late:
         return HookFailed(

@@ -33,7 +33,7 @@ def origin(view: ModalTestView) -> Table:
     """Return file, checksums and version; a checksum is complete, for comparison."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
-    remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
+    remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it again"
     facts = {
         "raw file": file.file_name,
         "its SHA-256": file.sha256,

@@ -50,7 +50,7 @@ def doubt_orders(problem: GapProblem, attribution: Attribution) -> tuple[str, ..
     return (
         f"The orders look wrong: were {numbering.words}, the hanger alone would fit better than "
         f"any cause does now{_tension(numbering.problem, peak)}. {numbering.asked} If so, number "
-        "them anew and diagnose again.",
+        "them again and repeat the diagnosis.",
     )
 
 

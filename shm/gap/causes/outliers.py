@@ -379,7 +379,7 @@ def describe_excluded(found: Cleared, outliers: Sequence[Outlier]) -> tuple[str,
     """Return remarks on frequencies that were done without."""
     otherwise = _led_before(found)
     remarks = tuple(
-        f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
+        f"{_measured(each)}, is excluded as a gross error (probability {_probability(each)}): "
         f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
         f"{_acts_alone(each)}"
         for each in outliers
@@ -387,7 +387,7 @@ def describe_excluded(found: Cleared, outliers: Sequence[Outlier]) -> tuple[str,
     if not remarks or not otherwise:
         return remarks
     right = "it prove right" if len(remarks) == 1 else "they prove right"
-    return (*remarks, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
+    return (*remarks, f"Should {right}, {otherwise} is the most probable cause: repeat the test.")
 
 
 def describe_doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:

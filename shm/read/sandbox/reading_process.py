@@ -40,7 +40,7 @@ HEADER = "header"
 """The JSON among the arrays of an answer: the name of its class and a node for each value."""
 LARGEST_ANSWER = 2
 """An answer may be so many times what is read at once."""
-_DAMAGED = "The file is damaged or made to harm: export it anew from its source."
+_DAMAGED = "The file is damaged or made to harm: export it again from its source."
 # judgement: ending a child takes milliseconds, starting the reader seconds, far longer on a full
 # machine; what fails at the start is not mended within the minute
 _GRACE_S, _START_S, _RETRY_S = 5.0, 120.0, 60.0

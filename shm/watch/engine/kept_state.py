@@ -35,7 +35,7 @@ def from_bytes(kind: type[T], content: bytes) -> T:
     except (zlib.error, TypeError, ValueError) as error:
         raise BadInput(
             f"A kept state of the watch cannot be read: {error!r}.",
-            remedy="Drop it: the watch then begins anew.",
+            remedy="Drop it: the watch then starts again.",
         ) from error
 
 

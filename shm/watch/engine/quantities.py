@@ -123,7 +123,7 @@ def base_point(baseline: Posterior, model: Model) -> FloatArray:
     if lacking:
         raise UsageError(
             f"the baseline in {model.name} was made by a former shm, without {', '.join(lacking)}.",
-            remedy="Set it anew: `shm drift rebaseline`.",
+            remedy="Set it again: `shm drift rebaseline`.",
         )
     return np.array([known[name] for name in model.parameter_names])
 

@@ -446,7 +446,7 @@ def _details(sizes: str, change: Change | None, beyond: Sequence[Drift], *, is_c
         sentences.append(
             "The change detector gives the same probability of any change"
             if detected in by_value
-            else f"The probability of any change, by the change detector, is {detected}"
+            else f"The probability of any change, which allows for disturbed visits, is {detected}"
         )
     if is_call and change is not None:
         years = f"{change.limit_years:.3g} years"

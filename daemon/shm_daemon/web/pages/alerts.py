@@ -145,7 +145,7 @@ def alerts(
     _: Reader,
     hanger: Before = None,
     open: Annotated[
-        bool, Query(description="Only those that stand and that nobody has acknowledged.")
+        bool, Query(description="Only those that are open and not acknowledged.")
     ] = False,
     limit: Annotated[
         int | None,

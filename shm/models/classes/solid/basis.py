@@ -131,7 +131,7 @@ def load(key: str) -> Reduction | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        _log.warning("the reduced basis %s cannot be read (%s): it is made anew.", path, error)
+        _log.warning("the reduced basis %s cannot be read (%s): it is computed again.", path, error)
         return None
 
 
@@ -152,7 +152,7 @@ def save(key: str, reduction: Reduction) -> None:
         Path(part.name).replace(path)
     except OSError as error:
         _log.warning(
-            "the reduced basis cannot be kept in %s (%s): each process will make it anew. "
+            "the reduced basis cannot be kept in %s (%s): each process will compute it again. "
             "Set SHM_CACHE to a folder that can be written.",
             path.parent,
             error,
