@@ -50,14 +50,10 @@ def test_a_pendulum_too_stiff_is_not_claimed_to_be_one_cause(data: Path) -> None
 
 
 def test_a_slip_among_good_points_is_no_effect(data: Path) -> None:
-    """80.2 Hz where 66 are expected: set aside, and no cause gets as much as a half."""
+    """80.2 Hz where 66 are expected: left out, and no cause gets as much as a half."""
     hanger, tests = page.string(data)
     found = diagnose(tests, hanger, GapOptions(seed=2))
-    (slip,) = found.outliers
-    assert (slip.plane, slip.order, slip.test) == ("transverse", 1, "50 N")
-    assert slip.probability > 0.9
-    assert slip.expected_hz == pytest.approx(66.4, abs=2.0)
-    (remarked,) = [each for each in found.remarks if "gross error" in each]
-    assert "of test 50 N, 80.2 Hz, is excluded" in remarked
+    (remarked,) = [each for each in found.remarks if each.startswith("Left out: test 50 N.")]
+    assert "80.2 Hz, is 26 % higher than expected from the other 5 tests" in remarked
     assert not [each for each in found.remarks if "contradict" in each]
     assert max(cause.probability for cause in found.causes) < 0.5

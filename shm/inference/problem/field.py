@@ -170,8 +170,10 @@ class FieldLikelihood(MeasuredFrequencies):
         self._shapes_factor = self.shapes.factor(self.shapes.misfits(model, theta[None]))
 
     def _typical(self, model: Model) -> FloatArray:
-        """Parameters (parameters,) in the middle of the prior, the tension as of a string."""
+        """Parameters (parameters,) in the middle of the prior, a tension as of a string."""
         hanger, theta = model.hanger, np.add(model.prior.lower, model.prior.upper) / 2
+        if not hanger.nominal_tension_n:
+            return np.asarray(theta)
         first = self._order.argmin()
         speed_m_s = 2 * hanger.length_m * self.frequency_hz[first] / (self._order[first] + 1)
         ratio = hanger.mass_per_length_kg_m * speed_m_s**2 / hanger.nominal_tension_n
