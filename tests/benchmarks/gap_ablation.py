@@ -59,7 +59,7 @@ def _group_near(causes: Sequence[Any], near: Sequence[bool]) -> tuple[tuple[int,
 VARIANTS: dict[str, Sequence[Change]] = {
     "whole": [],
     "whole, other seed": [],
-    "no lobes": [(sampling._Lobes, "__init__", one_peak)],
+    "no lobes": [(sampling.Lobes, "__init__", one_peak)],
     "no draws of an update": [(search, "_with_draws_of_update", lambda _, fit, rng: fit)],
     "no proposals without the effect": [(sampling, "_HOW", replace(sampling._HOW, without=1e-9))],
     "only exact linear terms": [(problem.GapProblem, "settle", lambda of, peak: None)],

@@ -29,6 +29,8 @@ import scipy
 from shm.gap.hypotheses.contract import Fit, Hypothesis, Method
 from shm.gap.hypotheses.noise import same_mode, smooth_over_orders
 from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.sampling import Lobes
+from shm.gap.hypotheses.target import Target
 from shm.inference.sampler.likelihood import Covariance, Likelihood
 from shm.inference.sampler.mixture import normalised
 from shm.values import FloatArray
@@ -98,11 +100,13 @@ def allow_for_laws(
     )
     chosen = rng.choice(len(ways), size=len(fit.draws), p=normalised(log_known))
     draws = fit.draws.copy()
+    lobes = Lobes(Target(problem, fit.hypothesis), fit.peaks)
     for way in np.unique(chosen[chosen > 0]):
         rows = np.flatnonzero(chosen == way)
         _, step, inner = found[way]
         normal = rng.standard_normal((len(rows), len(fit.z)))
-        draws[rows] = fit.z + step + np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
+        about = fit.z + step + np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
+        draws[rows] = lobes.spread(about, rng) if len(lobes.peaks) > 1 else about
     return ByLaws(
         float(scipy.special.logsumexp(log_known)), float(scipy.special.logsumexp(unknown)), draws
     )

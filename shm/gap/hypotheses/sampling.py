@@ -172,7 +172,7 @@ class _Proposal:
         return np.asarray(np.logaddexp(log_mixture, np.log(self.of_prior) + log_normal(w)))
 
 
-class _Lobes:
+class Lobes:
     """Hold the parts of a posterior that lie apart, each with its peak, the best first.
 
     A place and its mirror image are two. They are alike but for size and shape, so that draws of
@@ -242,7 +242,7 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._lobes = _Lobes(target, peaks)
+        self._lobes = Lobes(target, peaks)
         about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
         near = [peak for peak, is_near in zip(peaks, about, strict=True) if is_near]
         self._collapsed = _Collapsed(target, near)
