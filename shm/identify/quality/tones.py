@@ -231,9 +231,6 @@ def _name(frequency_hz: float, options: IdentifyOptions) -> str:
 
 
 _LEAST_BEFORE_S = 0.25  # judgement: lines of 4 Hz; of half a second that crews are told to record
-_MOST_BEFORE = 2.0
-"""judgement, of the power in ring-downs' later halves: what is louder is a ring-down whose hit the
-record does not show, and rings in step with others where hits are equally spaced."""
 # judgement: n random phases are steady by 1/n; three leave a mode below _STEADY, 12 surely
 _FEW_SEGMENTS = 3
 _SEGMENTS_WITHOUT_HITS = 12
@@ -300,9 +297,10 @@ def stretches(
     quiet = starts[0] - margin if starts else 0
     before = _stretch(signals, 0, quiet) if quiet >= _LEAST_BEFORE_S * rate else None
     if before is not None and later:
+        # Louder than what is left later, it is a ring-down itself, whose hit was not recorded: in
+        # step with the others where hits are equally spaced.
         usual = np.mean([np.mean(part.signals**2) for part in later])
-        if np.mean(before.signals**2) > _MOST_BEFORE * usual:
-            before = None
+        before = None if np.mean(before.signals**2) > 2 * usual else before
     return Stretches(later, before, rate, signals.shape[1])
 
 
