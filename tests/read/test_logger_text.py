@@ -164,7 +164,7 @@ def test_bytes_without_a_channel_are_no_tdms(tmp_path: Path) -> None:
 
 
 def test_two_rates_of_a_heading_are_refused(tmp_path: Path) -> None:
-    rows = "".join(f"{i};{-i}\n" for i in range(20))
+    rows = "".join(f"{i};{-i}\n" for i in range(60))
     path = tmp_path / "a.csv"
     path.write_text(f"Sample rate;512 Hz\nScan rate;1000 Hz\nForce [N];Acc [m/s2]\n{rows}")
     refused(path, "Sample rate: 512 Hz; Scan rate: 1000 Hz")

@@ -235,7 +235,7 @@ def stabilised(
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)
-    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful)
+    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful, late_s)
 
 
 def merge_findings(found: Finding, other: Finding) -> Finding:

@@ -132,7 +132,7 @@ def _has_hits(record: Recording, options: IdentifyOptions) -> bool:
 def _refuse_unusable(
     record: Recording, first: Recording, hammered: bool, options: IdentifyOptions
 ) -> None:
-    """Raise BadInput for a record that lacks a channel, is too slow, too short or of another rate."""
+    """Raise BadInput for a record that lacks a channel, is too slow, short or of another rate."""
     rate = record.sampling_rate_hz
     fault = remedy = ""
     if (hammered and record.force is None) or not record.accelerations:
