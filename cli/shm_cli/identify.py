@@ -16,7 +16,7 @@ from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.each_hit import as_csv
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
-from shm.read.sandbox import read_test
+from shm.read.sandbox import peek_test, read_test
 from shm.report.as_text import as_text
 from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_paper
@@ -198,13 +198,20 @@ def _identified(
 
 
 def _read(path: Path, workspace: Workspace | None) -> tuple[Recording | FrequencyResponse, ...]:
-    """Read a file as the workspace would, by the profile of its logger."""
+    """Read a file as the workspace would, by the profile of its logger; say what is left out."""
     if workspace is None:
-        return read_test(path)
+        return _records_of(path)
     from shm.pipeline.intake import as_taken_in
 
     with as_taken_in(path, workspace) as found:
-        return read_test(found)
+        return _records_of(found)
+
+
+def _records_of(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
+    records = read_test(path)
+    if names := dict.fromkeys(name for look in peek_test(path) for name in look.left_out):
+        click.echo(f"Left out of {path.name}: {', '.join(names)}.", err=True)
+    return records
 
 
 def _refuse_several_hangers(sheets: Sequence[ModalTestReport]) -> None:

@@ -148,13 +148,15 @@ class FoundMode:
 class Finding:
     """Hold the modes that an identifier found, by rising frequency, and the poles that it dropped.
 
-    `doubtful` are dropped ones that may be modes: one hit or one order disagrees.
+    `doubtful` are dropped ones that may be modes: one hit or one order disagrees. `late_s` are
+    the delays (channels,) that were removed from the shapes; None where none was.
     """
 
     modes: tuple[FoundMode, ...]
     dropped: tuple[Dropped, ...]
     poles: Poles
     doubtful: tuple[FoundMode, ...] = ()
+    late_s: FloatArray | None = None
 
 
 def poles_of_modes(modes: Sequence[FoundMode] | Sequence[Mode]) -> ComplexArray:

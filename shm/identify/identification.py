@@ -150,7 +150,7 @@ def identify(
         level_left = 1.0
         free = linear_below_level(measurements, placement.modes) if placement.modes else 1.0
         strange = [f"until {free:.0%} of their level is left, {_KNOCKS}"] if free < 1 else []
-        noted = [*found.notes, *strange]
+        noted = [*found.notes, *strange, *_notes_of_delays(found, slowest_hz, options)]
     hits = _hits_in_time(measurements)
     amplitude = _amplitude(hits, options)
     return Identification(
@@ -305,6 +305,25 @@ def _hits_in_time(measurements: Sequence[Measurement]) -> tuple[Hit, ...]:
     """Return the hits of all measurements, by record and start."""
     hits = (hit for measurement in measurements for hit in measurement.hits)
     return tuple(sorted(hits, key=lambda hit: (hit.record, hit.start)))
+
+
+def _notes_of_delays(
+    found: JoinedFinding, sampling_rate_hz: float, options: IdentifyOptions
+) -> Iterator[str]:
+    """Yield which channels are late by more than a converter that goes from one to the next.
+
+    Delays are known to some percent of the shortest period: less than a quarter says little.
+    """
+    late_s = found.finding.late_s
+    if late_s is None:
+        return
+    least_s = max(1 / sampling_rate_hz, 0.25 / options.band_high_hz)
+    for point, seconds in zip(found.points, late_s - late_s.min(), strict=True):
+        if seconds > least_s:
+            yield (
+                f"{point.name} is {1e3 * seconds:.2g} ms late: removed from the shapes; check the "
+                "clocks of the sensors"
+            )
 
 
 def _notes_of_records(

@@ -19,7 +19,7 @@ from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import Header
 from shm.read.limits import limits, refuse_large, refuse_many_samples
-from shm.read.logger_words import ACCELERANCE
+from shm.read.logger_words import ACCELERANCE, seconds_of
 from shm.read.sidecar import sidecar_path
 from shm.read.table import Column, Description, Table, is_raw
 from shm.read.time_axis import on_even_grid, rate_of
@@ -168,6 +168,7 @@ def sampling_rate(found: Description) -> float:
     rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
     if found.times is not None:
         rate = rate_of(_seconds(found), found.table.uneven(found.times), stated_hz)
+        _refuse_other_times(found, found.times)
     if math.isnan(stated_hz) and math.isnan(rate):
         raise BadInput(
             "the sampling rate is missing.",
@@ -189,6 +190,29 @@ def sampling_rate(found: Description) -> float:
 def _seconds(found: Description) -> FloatArray:
     assert found.times is not None
     return found.seconds * np.asarray(found.times.load(), float)
+
+
+def _refuse_other_times(found: Description, times: Column) -> None:
+    """Raise BadInput for a further column of times that is not the first one's, from its start.
+
+    It may count more coarsely, as a clock of whole seconds does.
+    """
+    for column in found.more_times if times.size > 1 else ():
+        seconds = _seconds(found) - _seconds(found)[0]
+        other = (seconds_of(column.unit) or 1.0) * np.asarray(column.load(), float)
+        steps = np.diff(other)
+        coarse = np.min(steps[steps > 0], initial=np.inf)
+        half_step = seconds[-1] / (len(seconds) - 1) / 2
+        away = np.abs(other - other[0] - seconds)
+        wrong = np.flatnonzero(~(away <= max(half_step, 1.5 * coarse if not steps.all() else 0)))
+        if len(wrong):
+            raise BadInput(
+                f"its times are not those of {times.name}.",
+                file=found.table.path,
+                channel=column.name,
+                line=found.table.line_of(int(wrong[0])),
+                remedy=_ONE_GRID,
+            )
 
 
 def _refuse_different_rates(found: Description) -> None:
@@ -272,6 +296,18 @@ def _refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
         )
 
 
+def _without_error_values(values: FloatArray) -> FloatArray:
+    """Return values with NaN for -9999 and the like, by which loggers mark a missing one."""
+    for worst in (np.nanmin(values, initial=0.0), np.nanmax(values, initial=0.0)):
+        digits = f"{abs(worst):.9g}".replace(".", "")
+        rest = values[(values != worst) & ~np.isnan(values)]
+        is_nines = len(digits) > 2 and set(digits) == {"9"} and len(rest) > 0
+        # A signal that is clipped there comes nearer to its limit than three times its range.
+        if is_nines and np.abs(worst - rest).min() > 3 * np.ptp(rest):
+            values = np.where(values == worst, NAN, values)
+    return values
+
+
 def _refuse_few(count: int, what: str, path: Path) -> None:
     if count < _LEAST_SAMPLES:
         raise BadInput(
@@ -287,7 +323,7 @@ def _channel(header: Header, described: PeekChannel, raw: FloatArray, path: Path
     quantity, unit = header.quantity_and_unit(described.name)
     calibration = 1.0 if math.isnan(described.calibration) else described.calibration
     with np.errstate(invalid="ignore"):
-        values = raw * (unit.si * calibration)
+        values = _without_error_values(raw) * (unit.si * calibration)
     _refuse_implausible(values, described.name, path)
     scale, states_unit = described.full_scale * unit.si, header.has_entry(described.name, "unit")
     return Channel(

@@ -10,7 +10,8 @@
     force,acc_1,acc_2
     0.12,0.003,-0.001
 
-What belongs to a column may also stand alone: `# acc_1.unit: g`. Columns may be separated by
+What belongs to a column may also stand alone: `# acc_1.unit: g`, a unit in its name, `acc_1 [g]`.
+Columns may be separated by
 commas, semicolons (then with decimal commas, if need be) or tabs. A first column `time`, in
 seconds, is checked against the sampling rate, or gives it. Any other heading is understood as
 `logger_text` says.
@@ -40,11 +41,11 @@ from shm.read.base import names_in
 from shm.read.content import LINE_BREAK, cells_of, mark_between
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, condition_entries, spread
 from shm.read.limits import refuse_long_header
-from shm.read.logger_words import ACCELERANCE, SI
+from shm.read.logger_words import ACCELERANCE, SI, name_and_unit, plain_unit, seconds_of
 from shm.read.table import Column, Role, Table
 from shm.values import NAN, Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 
-_TIME = re.compile(r"t|time([ _]?[\[(]?s[\])]?)?", re.IGNORECASE)
+_TIME = re.compile(r"t|time([ _]?s)?", re.IGNORECASE)
 _PLAIN = re.compile(r"[^,;\t\r\n#\"]+")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _SAMPLE = "a line of names such as force,acc_1,acc_2"
@@ -86,10 +87,17 @@ class _Text:
         refuse_long_header(sum(map(len, lines[: at + 1])), path)
         self.at, self.mark = at, mark_between(lines[at])
         self.names = cells_of(lines[at], self.mark)
+        self.units: dict[str, str] = {}
 
     def record(self) -> Table:
+        for at, text in enumerate(self.names):
+            if text.endswith(("]", ")")):
+                self.names[at], unit = name_and_unit(text)
+                self.units[self.names[at]] = unit
         self._refuse_names()
-        timed = _TIME.fullmatch(self.names[0]) is not None
+        first = self.names[0]
+        in_seconds = seconds_of(self.units.get(first, "s")) is not None
+        timed = in_seconds and _TIME.fullmatch(first) is not None
         names = self.names[timed:]
         header, remarks = self._header(names)
         body = self._body(self.at + 1)
@@ -97,7 +105,7 @@ class _Text:
         columns = []
         for at, name in enumerate(self.names):
             stated = header.channels.get(name, {})
-            unit = stated["unit"].text if "unit" in stated else ""
+            unit = stated["unit"].text if "unit" in stated else self.units.get(name, "")
             role: Role = "times" if timed and at == 0 else "channel"
             load = partial(lambda at: rows()[at], at)
             columns.append(Column(name, len(body), load, unit, role, stated))
@@ -168,6 +176,9 @@ class _Text:
     def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
         """Return the header of the lines above the names, and remarks on unknown keys."""
         channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
+        for name, unit in self.units.items():
+            if unit and name in channels:
+                channels[name]["unit"] = Entry(unit, self.path, self.at + 1)
         keys = {f"{a}{dot}{b}": (n, k) for n in names for k in CHANNEL_KEYS for dot in "._ "
                 for a, b in ((n.lower(), k), (k, n.lower()))}  # fmt: skip
         entries: dict[str, Entry] = {}
@@ -179,17 +190,17 @@ class _Text:
             key, value = key.strip().lower(), value.strip()
             entry = Entry(value.strip(f"{self.mark},; "), self.path, line)
             if key in KEYS:
-                entries[key] = entry
+                _state(entries, key, entry)
             elif key in CHANNEL_KEYS:
                 cells = value.split(self.mark if self.mark in value else ",")
                 if len(cells) == len(names) + 1 == len(self.names):
                     del cells[0]  # of the column of times
                 listed = [Entry(cell.strip(), self.path, line) for cell in cells]
                 for name, each in spread(key, listed, names, entry).items():
-                    channels[name][key] = each
+                    _state(channels[name], key, each, name)
             elif key in keys:
                 name, channel_key = keys[key]
-                channels[name][channel_key] = entry
+                _state(channels[name], channel_key, entry, name)
             else:
                 remarks.append(f"line {line}: {key!r} is not a key of recordings; left out.")
         return Header(self.path, channels, entries), tuple(remarks)
@@ -241,6 +252,18 @@ class _Text:
     ) -> BadInput:
         line = None if at is None else at + 1
         return BadInput(f"{what}.", file=self.path, channel=channel, line=line, remedy=f"{remedy}.")
+
+
+def _state(entries: dict[str, Entry], key: str, entry: Entry, channel: str = "") -> None:
+    """Add an entry; raises BadInput where an earlier line states another value of its key."""
+    before = entries.get(key, entry)
+    if before.text and entry.text and plain_unit(before.text) != plain_unit(entry.text):
+        raise entry.refusal(
+            f"{key} = {entry.text}, but line {before.line} states {before.text}.",
+            "Remove the line that is wrong.",
+            channel,
+        )
+    entries[key] = entry if entry.text else before
 
 
 def _is_remark(line: str) -> bool:

@@ -41,7 +41,8 @@ def describe(
     used = tuple(column for column in found if column not in out)
     size = next((column.size for column in used or table.choosable), 0)
     fitting = [column for column in others if column.size == size]
-    times = next((c for c in fitting if roles[c.name] == "times"), None)
+    clocks = [column for column in fitting if roles[column.name] == "times"]
+    times = next(iter(clocks), None)
     frequencies = next((c for c in fitting if roles[c.name] == "frequencies"), None)
     unit = _text(in_sidecar.get(times.name, {}), "unit") or times.unit if times else ""
     idle = [
@@ -58,6 +59,7 @@ def describe(
         is_response,
         times,
         words.seconds_of(unit) or 1.0,
+        tuple(clocks[1:]),
         frequencies,
         (*named, *table.left_out, *(column.name for column in out)),
     )

@@ -10,7 +10,9 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.logger_rows import Dialect, is_number, number_of
 from shm.read.stamps import is_stamp
@@ -229,19 +231,30 @@ def _with_unit(key: str, value: str) -> tuple[str, str]:
 # ---------------------------------------------------------------- what the facts say
 
 
-def stated_rate(facts: Sequence[tuple[str, str]], decimal: str) -> float:
-    """Return the sampling rate of a preamble in Hz; NaN where it gives none."""
+def stated_rate(facts: Sequence[tuple[str, str]], decimal: str, path: Path) -> float:
+    """Return the sampling rate of a preamble in Hz; NaN where it gives none.
+
+    Raises BadInput where lines state two that no rounded step explains.
+    """
+    stated: dict[float, str] = {}
     for key, value in facts:
         number, unit = leading_quantity(value, decimal)
         if not number > 0:
             continue
         hertz = _HERTZ.fullmatch(unit)
+        seconds = words.seconds_of(unit) if unit else 1.0
         if words.means_rate(key) and hertz:
-            return number * (1e3 if hertz[1] else 1.0)
-        if words.means_interval(key):
-            seconds = words.seconds_of(unit) if unit else 1.0
-            if seconds:
-                return 1 / (number * seconds)
+            stated.setdefault(number * (1e3 if hertz[1] else 1.0), f"{key}: {value}")
+        elif words.means_interval(key) and seconds:
+            stated.setdefault(1 / (number * seconds), f"{key}: {value}")
+    if stated and max(stated) > 1.05 * min(stated):
+        raise BadInput(
+            f"its heading states several sampling rates: {'; '.join(stated.values())}.",
+            file=path,
+            remedy="Remove the lines that are wrong.",
+        )
+    if stated:
+        return next(iter(stated))
     for key, value in facts:
         found = _RATE_IN_WORDS.search(f"{key} {value}")
         if found is not None and "filter" not in f"{key} {value}".lower():

@@ -115,7 +115,7 @@ def _parsed(
 def _table(heading: Heading, block: DataRows, path: Path, before: int = 0) -> Table:
     """Return the table of a heading of which `before` lines are not in the file."""
     decimal = block.dialect.decimal
-    rate = stated_rate(heading.facts, decimal)
+    rate = stated_rate(heading.facts, decimal, path)
     order = day_order_of(_days(heading), block)
     clock = clock_of(heading, block, rate, order, path)
     time, is_local = clock.start, clock.is_local
@@ -152,14 +152,17 @@ def _table(heading: Heading, block: DataRows, path: Path, before: int = 0) -> Ta
 def _timed(table: Table, heading: Heading, clock: Clock, rate_hz: float, decimal: str) -> Table:
     """Return a table with its times, and a rate by them where that of the heading is rounded."""
     assert clock.seconds is not None
-    times = Column(clock.name, len(clock.seconds), clock.seconds.copy, "s", "times")
+    times, *more = (
+        Column(name, len(seconds), seconds.copy, "s", "times")
+        for name, seconds in ((clock.name, clock.seconds), *clock.more)
+    )
     entries = dict(table.entries)
     if not math.isnan(rate_hz):
         by_times = rate_of(clock.seconds, table.uneven(times), rate_hz)
         entries |= entries_of(
             {"sampling_rate_hz": unrounded(rate_hz, by_times, heading.facts, decimal)}, table.path
         )
-    return replace(table, columns=(*table.columns, times), entries=entries)
+    return replace(table, columns=(*table.columns, times, *more), entries=entries)
 
 
 def _stacked(lines: Sequence[str], path: Path) -> Table | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,7 +26,7 @@ from shm.read.stamps import (
     without_clock_change,
 )
 from shm.read.time_axis import REMEDY
-from shm.values import FloatArray
+from shm.values import NAN, FloatArray
 
 if TYPE_CHECKING:
     from shm.read.logger_heading import Heading
@@ -41,14 +41,15 @@ _EVEN = 0.1  # judgement: of a step, which may be rounded
 class Clock:
     """The times of the rows, in `seconds`, by the column `name`; None where none tells them.
 
-    `used` are the columns without a measurement. `possible_starts` are several where the day of the
-    start can be read in several orders; `is_local` says that the start is by a clock that names no
-    zone.
+    `more` are further columns of times, by name and in s; `used` the columns without a measurement.
+    `possible_starts` are several where the day of the start can be read in several orders;
+    `is_local` says that the start is by a clock that names no zone.
     """
 
     used: frozenset[int]
     name: str = ""
     seconds: FloatArray | None = None
+    more: tuple[tuple[str, FloatArray], ...] = ()
     start: datetime | None = None
     possible_starts: tuple[PossibleTime, ...] = ()
     is_local: bool = False
@@ -74,11 +75,26 @@ def clock_of(
         if found is not None:
             seconds, start = found
             clock = replace(clock, name=heading.names[place], seconds=seconds, start=start)
+            clock = replace(clock, more=tuple(_more(heading, block, times, place, stated_hz, path)))
             return clock if start or not stamps else _started(clock, _stamps(block, 0)[0], order)
     if stamps:
         return _of_stamps(clock, heading.names[stamps[0]], block, order, path)
     remarks = (f"the unit of {heading.names[times[0]]} is not said; left out.",) if times else ()
     return replace(clock, remarks=remarks)
+
+
+def _more(
+    heading: Heading, block: DataRows, times: Sequence[int], used: int, stated_hz: float, path: Path
+) -> Iterator[tuple[str, FloatArray]]:
+    """Yield name and seconds of further columns of times; NaN where one has ended."""
+    for place in times:
+        values, _ = values_of(block, place, path)
+        known = np.isfinite(values)
+        found = _since_start(values[known], heading.units[place], stated_hz)
+        if place > used and found is not None:
+            seconds = np.full(len(values), NAN)
+            seconds[known] = found[0]
+            yield heading.names[place], seconds
 
 
 def day_order_of(days: Sequence[str], block: DataRows) -> DayOrder | None:

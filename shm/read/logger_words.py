@@ -142,6 +142,7 @@ _FORCE = re.compile(
 _ACCELERATION = re.compile(
     r"acc|beschl|\ba(_?\d+)?_?[xyz]?\b|\bb\d+\b|vibration|schwing|acz|\bicp|iepe", re.IGNORECASE
 )
+_SIZE = re.compile(r"\babsolute? (acc|beschl)|magnitude|betrag|resultant|resultier", re.IGNORECASE)
 _TRANSVERSE = re.compile(r"transv|\bquer|_quer|querricht|lateral", re.IGNORECASE)
 _LONGITUDINAL = re.compile(r"longit|l(ä|ae)ngs", re.IGNORECASE)
 _SENSITIVITY = re.compile(
@@ -224,6 +225,11 @@ def quantity_meant(name: str) -> Quantity | None:
 def means_force_alone(name: str) -> bool:
     """Return whether a name is that of a force, and holds no word of acceleration."""
     return _FORCE.search(name) is not None and _ACCELERATION.search(name) is None
+
+
+def means_no_axis(name: str) -> bool:
+    """Return whether a name is that of the size of an acceleration, whose sign is lost."""
+    return _SIZE.search(name) is not None
 
 
 def plane_meant(name: str) -> Plane | None:

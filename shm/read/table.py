@@ -53,8 +53,11 @@ class Column:
         cls, name: str, unit: str, values: Any, path: Path, line: int | None = None, **more: Any
     ) -> Column:
         """Return a column of values, a channel where name and unit say what it measures."""
-        role: Role = "channel" if is_measured(name, unit) else "other"
         stated = stated_entries(name, unit, path, line)
+        if words.means_no_axis(name):
+            more |= {"label": f"{name} (no axis)", "may_be_chosen": False}
+            return cls(name, len(values), lambda: values, unit, "other", stated, **more)
+        role: Role = "channel" if is_measured(name, unit) else "other"
         return cls(name, len(values), lambda: values, unit, role, stated, **more)
 
 
@@ -121,7 +124,8 @@ class Table:
 class Description:
     """A table as file and sidecar describe it: `used` are its channels, or responses.
 
-    The channels of `header` are those of `used`, in the same order.
+    The channels of `header` are those of `used`, in the same order. `more_times` are further
+    columns of times, of which a logger writes one for each sensor.
     """
 
     table: Table
@@ -130,6 +134,7 @@ class Description:
     is_response: bool
     times: Column | None
     seconds: float
+    more_times: tuple[Column, ...]
     frequencies: Column | None
     left_out: tuple[str, ...]
 

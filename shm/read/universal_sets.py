@@ -85,7 +85,8 @@ def load(path: Path, *, headers_only: bool) -> Content:
 
 def refuse_cut_off(raw: bytes, path: Path) -> None:
     """Raise BadInput where a file ends within a data set."""
-    if not raw.rstrip().endswith(b"-1"):
+    is_open = b"\x00" not in raw and len(_MARK.findall(raw)) % 2 == 1
+    if is_open or not raw.rstrip().endswith(b"-1"):
         raise BadInput(
             "the file ends within a data set.",
             file=path,

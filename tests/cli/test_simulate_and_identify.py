@@ -56,6 +56,17 @@ def test_identified_frequencies_are_planted(shm: Shm, recording: Path, hanger_fi
     assert len(test["modes"]) >= 8
 
 
+def test_identify_names_columns_left_out(shm: Shm, recording: Path, tmp_path: Path) -> None:
+    """A force in percent is of no use, but nobody should believe that it was used."""
+    found = read(recording)
+    assert isinstance(found, Recording)
+    heads = ["Time [s]", "force [%]", *(f"{c.name} [m/s2]" for c in found.accelerations)]
+    values = np.array([np.arange(found.samples) / 512, *(c.values for c in found.channels)])
+    path = tmp_path / "percent.csv"
+    np.savetxt(path, values.T, "%.6g", ";", header=";".join(heads), comments="")
+    assert "Left out of percent.csv: force." in shm("identify", path).said
+
+
 def test_identify_writes_document(
     shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path
 ) -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from pyoma2.functions.gen import example_data
@@ -7,7 +9,7 @@ from scipy.signal import lfilter
 
 from shm.identify import IDENTIFIERS, IdentifyOptions
 from shm.identify.contract import Finding, Measurement
-from shm.values import ResponsePoint
+from shm.values import FloatArray, ResponsePoint
 
 OPTIONS = IdentifyOptions(2.0, 50.0)
 RATE_HZ = 128.0
@@ -17,25 +19,50 @@ FREQUENCIES_HZ = (6.0, 6.1, 12.4, 12.6, 19.3, 19.6, 27.0, 27.5)
 DAMPING_RATIO = 0.003
 
 
-def _found(tone_hz: float = 0.0) -> Finding:
-    """Modes in pairs of two planes, each moved by white noise for five minutes."""
-    rng = np.random.default_rng(8)
-    samples = int(300 * RATE_HZ)
-    motion = 0.02 * rng.standard_normal((4, samples))
-    for number, frequency_hz in enumerate(FREQUENCIES_HZ):
+def _moved_by_noise(
+    modes: Sequence[tuple[float, Sequence[float]]], samples: int, damping_ratio: float, seed: int
+) -> FloatArray:
+    """Return (channels, samples): each mode, a frequency and a shape, moved by its own noise."""
+    rng = np.random.default_rng(seed)
+    motion = 0.02 * rng.standard_normal((len(PLACES), samples))
+    for frequency_hz, shape in modes:
         omega = 2 * np.pi * frequency_hz
-        pole = omega * (-DAMPING_RATIO + 1j * np.sqrt(1 - DAMPING_RATIO**2))
+        pole = omega * (-damping_ratio + 1j * np.sqrt(1 - damping_ratio**2))
         noise = rng.standard_normal(samples).astype(complex)
         modal = lfilter([1], [1, -np.exp(pole / RATE_HZ)], noise).imag
+        motion += np.outer(shape, modal / modal.std())
+    return motion
+
+
+def _identified(motion: FloatArray, options: IdentifyOptions) -> Finding:
+    points = tuple(ResponsePoint("a", plane, x) for plane, x in PLACES)  # type: ignore[arg-type]
+    parts = tuple(np.array_split(motion, PARTS, axis=1))
+    return IDENTIFIERS["ssi"](Measurement("ambient", points, parts, RATE_HZ, None), options)
+
+
+def _found(tone_hz: float = 0.0) -> Finding:
+    """Modes in pairs of two planes, each moved by white noise for five minutes."""
+    samples = int(300 * RATE_HZ)
+    modes = []
+    for number, frequency_hz in enumerate(FREQUENCIES_HZ):
         shape = np.zeros(4)
         shape[number % 2 :: 2] = np.sin((number // 2 + 1) * np.pi * np.array([1.2, 2.9]) / 10)
-        motion += np.outer(shape, modal / modal.std())
+        modes.append((frequency_hz, shape))
+    motion = _moved_by_noise(modes, samples, DAMPING_RATIO, 8)
     if tone_hz:
         tone = np.sin(2 * np.pi * tone_hz * np.arange(samples) / RATE_HZ)
         motion += np.outer([1.0, 0.5, -0.7, 0.3], tone)
-    points = tuple(ResponsePoint("a", plane, x) for plane, x in PLACES)  # type: ignore[arg-type]
-    parts = tuple(np.array_split(motion, PARTS, axis=1))
-    return IDENTIFIERS["ssi"](Measurement("ambient", points, parts, RATE_HZ, None), OPTIONS)
+    return _identified(motion, OPTIONS)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_a_mode_above_the_band_makes_none(seed: int) -> None:
+    """On the slope of a window's filter a mode at 42.3 Hz looked like one at 40.5 Hz."""
+    above = [(42.3, (1.0, 0.0, -0.6, 0.0)), (42.7, (0.0, 1.0, 0.0, -0.6))]
+    inside = [(33.0, (1.0, 0.0, 0.6, 0.0)), (33.3, (0.0, 1.0, 0.0, 0.6))]
+    motion = _moved_by_noise([*above, *inside], 30_000, 0.002, seed)
+    found = _identified(motion, IdentifyOptions(28.8, 40.9))
+    assert [mode.frequency_hz for mode in found.modes] == pytest.approx([33.0, 33.3], rel=1e-3)
 
 
 def test_motion_without_a_hammer_gives_modes_within_their_intervals() -> None:

@@ -39,30 +39,47 @@ def test_delays_are_found_and_taken_off() -> None:
     assert collinearity(real.shapes.T).min() > 0.99
 
 
-def test_modes_of_late_channels_are_not_dropped_and_keep_their_shapes() -> None:
-    """Three of the eight would have shapes that are not real."""
+SHAPES = np.sin(np.outer(np.arange(1, 9), [0.3, 0.6, 0.9, 1.2]))
+
+
+def _late_record(late_s: FloatArray) -> Recording:
+    """Return three hits at 256 Hz on a structure of eight modes, each channel late."""
     rate_hz, slot_s, hits = 256.0, 5.0, 3
     rng = np.random.default_rng(4)
-    shapes = np.sin(np.outer(np.arange(1, 9), [0.3, 0.6, 0.9, 1.2]))
     t = np.arange(int(hits * slot_s * rate_hz)) / rate_hz
     motion = 1e-3 * rng.standard_normal((4, len(t)))
     force = 0.1 * rng.standard_normal(len(t))
     for begin_s in 0.4 + slot_s * np.arange(hits):
         first = int(begin_s * rate_hz)
         force[first : first + 2] += 1000.0
-        for channel, late_s in enumerate(LATE_S):
-            since = np.maximum(t - begin_s - late_s, 0)
-            for hz, shape in zip(FREQUENCIES_HZ, shapes, strict=True):
+        for channel, delay_s in enumerate(late_s):
+            since = np.maximum(t - begin_s - delay_s, 0)
+            for hz, shape in zip(FREQUENCIES_HZ, SHAPES, strict=True):
                 ring = np.exp(-2 * np.pi * hz * 0.004 * since) * np.sin(2 * np.pi * hz * since)
                 motion[channel] += shape[channel] * ring
     channels = [Channel("force", "force", force, None, 1.0)] + [
         Channel(f"acc_{row}", "acceleration", values, "transverse", 1.0 + row)
         for row, values in enumerate(motion)
     ]
-    record = Recording("late.csv", tuple(channels), rate_hz)
-    structure = Hanger.without_model(1)
+    return Recording("late.csv", tuple(channels), rate_hz)
+
+
+def _notes(late_s: FloatArray) -> str:
+    record = _late_record(late_s)
+    found = identify([record], OPTIONS, test_id="t", hanger=Hanger.without_model(1))
+    return " ".join(found.notes)
+
+
+def test_a_channel_that_is_late_by_more_than_a_sample_is_named() -> None:
+    assert "acc_2 is 4.5 ms late" in _notes(np.array([0.0, 0.0, 4.5e-3, 0.0]))
+    assert " late, " not in _notes(LATE_S)
+
+
+def test_modes_of_late_channels_are_not_dropped_and_keep_their_shapes() -> None:
+    """Three of the eight would have shapes that are not real."""
+    record, structure = _late_record(LATE_S), Hanger.without_model(1)
     found = identify([record], OPTIONS, test_id="t", hanger=structure).test.modes
     assert np.array([m.frequency_hz for m in found]) == pytest.approx(FREQUENCIES_HZ, rel=1e-3)
-    for mode, shape in zip(found, shapes, strict=True):
+    for mode, shape in zip(found, SHAPES, strict=True):
         values = np.array([point.value for point in mode.shape])
         assert (values @ shape) ** 2 / (values @ values) / (shape @ shape) > 0.99

@@ -15,7 +15,15 @@ from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.identify.measuring.setups import measure_recordings
 from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
-from shm.values import BoolArray, Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
+from shm.values import (
+    BoolArray,
+    Channel,
+    FloatArray,
+    FrequencyResponse,
+    Plane,
+    Recording,
+    ResponsePoint,
+)
 from tests.identify.planted import (
     FIRST,
     OPTIONS,
@@ -29,6 +37,7 @@ from tests.identify.planted import (
 )
 from tests.identify.signals import (
     Planted,
+    Sensor,
     as_recording,
     force_signal,
     half_sine,
@@ -240,6 +249,27 @@ def test_a_lightly_damped_mode_is_no_tone() -> None:
     """0.01 % at 12 Hz: it still rings at the end, but each hit gives it a new phase."""
     modes = [Planted(12.0, 1e-4, (1.0, 0.5)), Planted(31.0, 1e-4, (0.5, 1.0))]
     assert check_of("tones", recording(modes, noise=0.02, lead_s=0.6)).verdict == "good"
+
+
+def test_a_ring_down_before_the_first_hit_makes_no_tone() -> None:
+    """The record begins in one, and hits are 8 s apart: lines of 1/8 Hz keep their phase."""
+    modes = [
+        Planted(25.2, 0.003, (1.0,)),
+        Planted(29.5, 0.002, (0.5,)),
+        Planted(34.0, 0.003, (1.0,)),
+    ]
+    tapped = recording(modes, (Sensor(),), noise=0.001, lead_s=0.0, seed=5)
+    record = replace(tapped, channels=tapped.channels[1:])
+    assert tones(measure_recordings([record], OPTIONS), [record], OPTIONS) == ()
+
+
+@pytest.mark.parametrize(
+    ("plane", "verdict"), [("longitudinal", "good"), ("transverse", "warning")]
+)
+def test_an_axis_across_the_motion_is_no_cable_fault(plane: Plane, verdict: str) -> None:
+    modes = [Planted(6.0, 0.002, (1.0, 0.0)), Planted(13.5, 0.003, (0.8, 0.0))]
+    sensors = (Sensor("transverse", 2.0), Sensor(plane, 2.0))
+    assert check_of("cable", recording(modes, sensors, noise=1e-3)).verdict == verdict
 
 
 def test_a_weak_tone_between_short_ring_downs_is_told() -> None:

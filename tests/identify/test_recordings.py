@@ -85,6 +85,7 @@ def test_no_usable_hit_is_not_identifiable_and_says_why() -> None:
         ([_channels(RECORD, RECORD.channels[0])], 50.0, "no acceleration channel"),
         ([RECORD], 600.0, "too slow"),
         ([RECORD, recording(hanger_modes(), rate_hz=2048.0)], 50.0, "sampling rate differs"),
+        ([replace(RECORD, sampling_rate_hz=1e12)], 50.0, "at 1e\\+12 Hz, less than any mode"),
     ],
 )
 def test_records_that_cannot_be_used_together_are_refused(

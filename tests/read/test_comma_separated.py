@@ -184,6 +184,12 @@ WHOLE = f"{HEAD}{NAMES}\n{ROWS}"
         (WHOLE.replace("N, m/s2, m/s2", "N, m/s2"), "test.csv, line 6", "2 values for 3 channels"),
         (WHOLE.replace("1.92, 2.52", "1.92, far"), "test.csv, line 7, channel acc_1", "'far'"),
         (WHOLE.replace(NAMES, "force,acc_1,acc_1"), "test.csv, line 8, channel acc_1", "twice"),
+        (f"# sampling_rate_hz: 256\n{WHOLE}", "test.csv, line 5", "= 512, but line 1 states 256"),
+        (f"# acc_2.unit: g\n{WHOLE}", "test.csv, line 7, channel acc_2", "but line 1 states g"),
+        (
+            WHOLE.replace(NAMES, "force,acc_1,acc_2 [g]"),
+            "test.csv, line 6, channel acc_2", "unit = m/s2, but line 8 states g",
+        ),
         (WHOLE.replace(NAMES, "force,,acc_2"), "test.csv, line 8", "no name"),
         (WHOLE.replace(NAMES + "\n", ""), "test.csv, line 8", "names of the columns are missing"),
         (HEAD, "test.csv", "no columns"),
@@ -201,6 +207,15 @@ def test_a_fault_is_refused_with_its_place_and_a_remedy(
         recorded(tmp_path, text)
     assert refusal.value.where == where
     assert refusal.value.remedy
+
+
+@pytest.mark.parametrize("time", ["Time [ms]", "time (ms)"])
+def test_units_in_brackets_of_names_count(tmp_path: Path, time: str) -> None:
+    rows = "".join(f"{2 * i},{i},{-i}\n" for i in range(20))
+    found = recorded(tmp_path, f"# hanger: 3\n{time},Force [kN],acc_1 (mg)\n{rows}")
+    assert [c.name for c in found.channels] == ["Force", "acc_1"]
+    assert [c.values[1] for c in found.channels] == pytest.approx([1000.0, -9.80665e-3])
+    assert found.sampling_rate_hz == pytest.approx(500)
 
 
 def test_a_peek_lists_problems_and_keys_it_does_not_know(tmp_path: Path) -> None:

@@ -161,3 +161,27 @@ def test_bytes_without_a_channel_are_no_tdms(tmp_path: Path) -> None:
     path.write_bytes(b"TDSm\x0e\0\0\0" + np.random.default_rng(1).bytes(3000))
     with pytest.raises(BadInput, match="not those of a TDMS file"):
         survey(path)
+
+
+def test_two_rates_of_a_heading_are_refused(tmp_path: Path) -> None:
+    rows = "".join(f"{i};{-i}\n" for i in range(60))
+    path = tmp_path / "a.csv"
+    path.write_text(f"Sample rate;512 Hz\nScan rate;1000 Hz\nForce [N];Acc [m/s2]\n{rows}")
+    refused(path, "Sample rate: 512 Hz; Scan rate: 1000 Hz")
+
+
+@pytest.mark.parametrize("mark", [-9999, 999, -999.9])
+def test_a_loggers_mark_of_an_error_is_a_missing_sample(tmp_path: Path, mark: float) -> None:
+    rows = "".join(f"{i};{mark if i in (4, 9) else i % 3}\n" for i in range(20))
+    path = tmp_path / "a.csv"
+    path.write_text(f"Sample rate;512 Hz\nForce [N];Acc [m/s2]\n{rows}")
+    assert np.flatnonzero(np.isnan(recorded(path).channels[1].values)).tolist() == [4, 9]
+
+
+def test_the_size_of_an_acceleration_is_no_channel(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 512:.5f};{i % 3};{i % 5}\n" for i in range(20))
+    path = tmp_path / "a.csv"
+    path.write_text(f"Time [s];Acceleration x [m/s2];Absolute acceleration [m/s2]\n{rows}")
+    found = peek(path)
+    assert [channel.name for channel in found.channels] == ["Acceleration x"]
+    assert found.left_out == ("Absolute acceleration (no axis)",)

@@ -130,3 +130,30 @@ def test_the_unit_of_times_follows_from_the_rate_that_is_said(
 
 def test_times_that_stand_still_have_no_unit() -> None:
     assert rate(np.zeros(40), 200.0, name="Time") == 200
+
+
+def of_two_sensors(second: FloatArray) -> str:
+    """Return a text of two sensors, each after its own column of times."""
+    rows = [f"{i / 100:.3f};{i % 7};{t:.3f};{i % 5}" for i, t in enumerate(second)]
+    return "\n".join(["Time 1 [s];A1 [m/s2];Time 2 [s];A2 [m/s2]", *rows])
+
+
+@pytest.mark.parametrize("second", [np.arange(200) / 100 + 7.5, np.arange(200) // 100])
+def test_a_second_column_of_times_that_agrees_changes_nothing(second: FloatArray) -> None:
+    table = logger_text.table_in(of_two_sensors(second), PATH)
+    assert table is not None
+    found = look(table, "CSV")
+    assert (found.problems, found.sampling_rate_hz, found.left_out) == ((), 100.0, ())
+    assert [channel.name for channel in found.channels] == ["A1", "A2"]
+
+
+@pytest.mark.parametrize(
+    ("second", "line"),
+    [(np.arange(200) * 0.012, 5), (np.where(np.arange(200) < 195, np.arange(200) / 100, NAN), 197)],
+)
+def test_a_second_column_of_other_times_is_refused(second: FloatArray, line: int) -> None:
+    table = logger_text.table_in(of_two_sensors(second), PATH)
+    assert table is not None
+    with pytest.raises(BadInput, match="are not those of Time 1") as refusal:
+        assemble(describe(table, with_sidecars=False))
+    assert (refusal.value.channel, refusal.value.line) == ("Time 2", line)

@@ -265,6 +265,9 @@ def test_a_number_that_is_none_is_refused_with_the_line_of_its_data_set(tmp_path
 def test_a_file_that_ends_within_a_data_set_is_refused(tmp_path: Path) -> None:
     path = uff(tmp_path, FORCE, ACCELERATION)
     path.write_bytes(path.read_bytes()[:-400])
+    begun = tmp_path / "begun.uff"
+    begun.write_bytes(uff(tmp_path, FORCE, name="whole.uff").read_bytes() + b"    -1\n")
+    refused(begun, "ends within a data set")
     for verb in (read, peek):
         with pytest.raises(BadInput, match="ends within a data set") as refusal:
             verb(path)

@@ -59,17 +59,23 @@ class Window:
     def _step(self, sampling_rate_hz: float) -> int:
         return max(1, int(sampling_rate_hz / (4 * self._reach_hz)))
 
-    def through(self, decay: FloatArray, sampling_rate_hz: float) -> FloatArray:
+    def through(
+        self, decay: FloatArray, sampling_rate_hz: float, *, forward: bool = False
+    ) -> FloatArray:
         """Return a free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
 
         The filter runs from the end to the beginning: so a sum of decaying sines stays one
         from its first sample on, and only its end, where the filter starts, is lost.
+
+        So do the products of motion that noise drives with itself, `forward`, at earlier times:
+        they hold no shorter lag of it. Filtered one way alone, it has modes on the filter's slopes.
         """
+        way = 1 if forward else -1
         middle = self.shift_hz + self._reach_hz
         turned = decay * np.exp(-2j * np.pi * middle / sampling_rate_hz * np.arange(decay.shape[1]))
         passed = scipy.signal.sosfilt(
-            _low_pass(2 * self._reach_hz / sampling_rate_hz), turned[:, ::-1]
-        )[:, ::-1]
+            _low_pass(2 * self._reach_hz / sampling_rate_hz), turned[:, ::way]
+        )[:, ::way]
         rate = self.rate_hz(sampling_rate_hz)
         slow = passed[:, :: self._step(sampling_rate_hz)]
         spoilt = int(_SETTLING / (_GUARD * (self.high_hz - self.low_hz)) * rate)

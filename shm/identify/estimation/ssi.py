@@ -121,12 +121,15 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
     by_length = sorted(decay.shape[1] for decay in measurement.decays)
     least = _LONG * by_length[-min(LEAST_HITS, len(by_length))]
     long = [decay for decay in measurement.decays if decay.shape[1] >= least]
-    decays = tuple(window.through(decay, rate) for decay in long)
+    decays = earlier = tuple(window.through(decay, rate) for decay in long)
+    if options.ambient_s:
+        earlier = tuple(window.through(motion, rate, forward=True) for motion in long)
     if max(map(np.std, decays)) < STOPPED * max(map(np.std, long)):
         return empty_finding(len(decays))
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
-    matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
+    pairs = zip(decays, earlier, strict=True)
+    matrices = [hankel(decay, mixed @ reference, rows) for decay, reference in pairs]
     slow = replace(measurement, decays=decays, sampling_rate_hz=rate_slow)
     return modes_of_hankel(
         _few_sums(matrices), rows, slow, window.options(options), window.shift_hz
@@ -232,7 +235,7 @@ def stabilised(
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)
-    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful)
+    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful, late_s)
 
 
 def merge_findings(found: Finding, other: Finding) -> Finding:

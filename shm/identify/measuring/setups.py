@@ -132,7 +132,7 @@ def _has_hits(record: Recording, options: IdentifyOptions) -> bool:
 def _refuse_unusable(
     record: Recording, first: Recording, hammered: bool, options: IdentifyOptions
 ) -> None:
-    """Raise BadInput for a record that lacks a channel, is too slow or of another rate."""
+    """Raise BadInput for a record that lacks a channel, is too slow, short or of another rate."""
     rate = record.sampling_rate_hz
     fault = remedy = ""
     if (hammered and record.force is None) or not record.accelerations:
@@ -142,6 +142,9 @@ def _refuse_unusable(
     elif rate < 2 * options.band_high_hz:
         fault = f"sampled at {rate:g} Hz, too slow for modes up to {options.band_high_hz:g} Hz."
         remedy = "Sample faster, or lower band_high_hz to less than half the sampling rate."
+    elif record.duration_s * options.band_high_hz < 1:
+        fault = f"lasts {record.duration_s:.2g} s at {rate:g} Hz, less than any mode's period."
+        remedy = "Correct the sampling rate that the file or its sidecar states."
     elif not math.isclose(rate, first.sampling_rate_hz, rel_tol=_SAME_RATE):
         fault = f"its sampling rate differs from that of {first.source}."
         remedy = "Identify records of different sampling rates one by one."

@@ -23,7 +23,7 @@ CABLE = "cable fault or a clock that drifts: jumps or bursts in one channel"
 WANDERS = "cable fault: the offset wanders more than the hanger moves"
 COPY = "cable fault: a copy of another channel"
 DEAD = "its value never changes: dead sensor or cable"
-SILENT = "cable fault: less than a thousandth of the other channels"
+SILENT = "cable fault: less than a thousandth of the other channels of its plane"
 HITS_NOT_SHOWN = "cable fault: without the hits that the motion shows"
 KNOCK = "disturbed: something other than the hammer struck, or samples are lost"
 OUTLIER = "outlier: its response is unlike that of the other hits"
@@ -83,9 +83,11 @@ def faults_of_channels(
 
     for fault, is_found in _PLAIN_FAULTS.items():
         add(fault, np.array([is_found(cut) for cut in cuts]))
+    planes = [channel.plane for channel in channels]
+    add(SILENT, np.array([_silent(cut, planes) for cut in cuts]))
     add(CLIPPED, _clipped(channels, rings, faults == ""))
     add(WANDERS, np.array([_wanders(part, sampling_rate_hz / step) for part in free]))
-    knocks, wild = _surprises(free, faults == "", [channel.plane for channel in channels])
+    knocks, wild = _surprises(free, faults == "", planes)
     add(KNOCK, wild & knocks[:, np.newaxis])
     add(CABLE, wild)
     return faults
@@ -146,10 +148,14 @@ def _gap_in(signal: FloatArray) -> int:
     return next((first for first, _ in _still_runs(signal)), 0)
 
 
-def _is_silent(cut: FloatArray) -> BoolArray:
-    moves = np.ptp(cut, axis=1)
-    sound = np.isfinite(moves) & (moves > 0)
-    return np.asarray(moves < _SILENT_SHARE * (np.median(moves[sound]) if sound.any() else 0.0))
+def _silent(cut: FloatArray, planes: Sequence[Plane | None]) -> BoolArray:
+    """Return the channels that hardly move while others of their plane do; all may lie across."""
+    moves, found = np.ptp(cut, axis=1), np.zeros(len(cut), dtype=bool)
+    for plane in set(planes):
+        group = np.array([each == plane for each in planes])
+        sound = group & (moves > 0)
+        found[group] = moves[group] < _SILENT_SHARE * (np.median(moves[sound]) if any(sound) else 0)
+    return found
 
 
 def _is_copy(cut: FloatArray) -> BoolArray:
@@ -166,7 +172,6 @@ def frozen(signals: FloatArray) -> BoolArray:
 _PLAIN_FAULTS: dict[str, Callable[[FloatArray], BoolArray]] = {
     NOT_A_NUMBER: lambda cut: ~np.isfinite(cut.sum(axis=1)),
     DEAD: lambda cut: np.ptp(cut, axis=1) == 0,
-    SILENT: _is_silent,
     FROZEN: frozen,
     COPY: _is_copy,
 }

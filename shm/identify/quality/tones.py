@@ -295,8 +295,12 @@ def stretches(
         if b - a >= LEAST_SAMPLES
     )
     quiet = starts[0] - margin if starts else 0
-    known = quiet >= _LEAST_BEFORE_S * rate
-    before = _stretch(signals, 0, quiet) if known else None
+    before = _stretch(signals, 0, quiet) if quiet >= _LEAST_BEFORE_S * rate else None
+    if before is not None and later:
+        # Louder than what is left later, it is a ring-down itself, whose hit was not recorded: in
+        # step with the others where hits are equally spaced.
+        usual = np.mean([np.mean(part.signals**2) for part in later])
+        before = None if np.mean(before.signals**2) > 2 * usual else before
     return Stretches(later, before, rate, signals.shape[1])
 
 
