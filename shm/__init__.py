@@ -89,7 +89,7 @@ _HOMES = {
     "shm.simulate": ("PlantedEffect",),
     "shm.values": (
         "AddedMass", "Diagnosis", "FrequencyResponse", "GapCheck", "Hanger", "ModalTest", "Mode",
-        "Posterior", "Recording", "Selection",
+        "Posterior", "Recording", "Selection", "ShapePoint",
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -46,6 +46,7 @@ from shm.values import (
     NextMeasurement,
     TensionEstimate,
 )
+from shm.values.diagnosis import joined
 from shm.values.verdict import DOUBTFUL, MIN_FIT_P_VALUE, SHAPES_OFF
 
 _ATTRIBUTION = 0.85
@@ -101,7 +102,7 @@ def examined(
         places=places(problem, attribution),
         no_gap_probability=attribution.no_gap_probability,
         unexplained_probability=attribution.unexplained_probability,
-        causes=tuple(_cause(problem, each) for each in attribution.explanations),
+        causes=_causes(problem, attribution.explanations),
         groups=attribution.groups,
         invisible=attribution.invisible,
         left_out=options.without,
@@ -223,7 +224,39 @@ def _shapes_off(p_values: tuple[float, float]) -> tuple[str, ...]:
     )
 
 
-def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
+def _causes(problem: GapProblem, explanations: Sequence[Explanation]) -> tuple[Cause, ...]:
+    """Return the causes.
+
+    A pair is fitted where its parts are likeliest, and may be where these are about as likely.
+    """
+    near = {each.effect: _near_best(each) for each in explanations}
+    found = []
+    for each in explanations:
+        cause = _cause(problem, each, near[each.effect][1:])
+        parts = list(zip(cause.effects, cause.places, strict=True))
+        also = [
+            joined(at if part == effect else place for part, place in parts)
+            for effect in cause.effects
+            for at in near.get(effect, ())
+            if len(parts) > 1
+        ]
+        every = dict.fromkeys(at for at in (*cause.also_at, *also) if at != cause.at)
+        found.append(replace(cause, also_at=tuple(every)))
+    return tuple(found)
+
+
+def _near_best(explanation: Explanation) -> tuple[str, ...]:
+    """Return the place of an effect, then others whose evidence is about that of the best."""
+    best = explanation.best
+    others = [
+        each.hypothesis.at
+        for each in explanation.variants
+        if each is not best and each.log_evidence > best.log_evidence - AS_LIKELY
+    ]
+    return best.hypothesis.at, *others
+
+
+def _cause(problem: GapProblem, explanation: Explanation, near: tuple[str, ...]) -> Cause:
     """Return a cause with its sizes; without evidence where a scan has left it far behind."""
     best = explanation.best
     is_known = best.fit is not None
@@ -239,11 +272,7 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
         group=explanation.group,
         also_at=(
             *(list_other_places(problem, best.posterior) if best.posterior else ()),
-            *(
-                each.hypothesis.at
-                for each in explanation.variants
-                if each is not best and each.log_evidence > best.log_evidence - AS_LIKELY
-            ),
+            *near,
         ),
     )
 

@@ -226,9 +226,10 @@ def _off_percent(tension_n: TensionEstimate) -> str:
 def write_details(diagnosis: Diagnosis) -> str:
     """Return the second paragraph: the cause, what to look at, what no hit reached, what next."""
     verdict = diagnosis.verdict
+    named = verdict.claim or verdict.runner_up
     sentences = (
         _state_size(verdict),
-        inspection(verdict.claim.leading) if verdict.claim else "",
+        inspection(named.leading) if named else "",
         _state_reach(diagnosis) if verdict.outcome is Outcome.NO_GAP else "",
         next_step(diagnosis),
     )
@@ -243,7 +244,10 @@ def _state_size(verdict: GapVerdict) -> str:
     if verdict.runner_up is None:
         return ""
     chance = formatting.spoken_probability(verdict.runner_up.probability)
-    return f"The most probable: {phrase(verdict.runner_up.leading)}, probability {chance}."
+    what = f"{phrase(verdict.runner_up.leading)}, probability {chance}"
+    if verdict.outcome is Outcome.NO_GAP:
+        return f"If there is a gap, most likely {what}."
+    return f"The most probable: {what}."
 
 
 def _state_reach(diagnosis: Diagnosis) -> str:

@@ -162,6 +162,8 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
     if unknown_leads and not found.is_within_errors:
         nearest = next(iter(group_causes(diagnosis.causes)), None)
         return _decline(diagnosis, _with_runner_up(found, nearest), nearest)
+    if doubt == "less probable than not":
+        found = _with_runner_up(found, next(iter(group_causes(diagnosis.causes)), None))
     return replace(
         found,
         outcome=Outcome.NO_GAP,

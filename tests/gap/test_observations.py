@@ -11,6 +11,7 @@ import pytest
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.causes.search import fit_alone, hypotheses
+from shm.gap.hypotheses.data_checks import usable
 from shm.gap.hypotheses.noise import nodes
 from shm.gap.hypotheses.observations import observed, remark_on_rounding, rounding_covariance
 from shm.gap.hypotheses.problem import GapProblem
@@ -226,3 +227,15 @@ def test_the_slopes_of_one_test_name_the_joint_that_slips() -> None:
     assert "joint_softening" in dict(
         diagnose([replace(told, modes=hit.modes)], PLAIN, options).invisible
     )
+
+
+@pytest.mark.parametrize("value", [math.nan, 0.0])
+def test_a_shape_without_its_own_plane_is_not_used_and_named(value: float) -> None:
+    """Scaled to unit length, what is seen across it alone would be noise."""
+    (test,) = simulated(hanger=HANGER_3, modes=3, shape_sd=1e-3, seed=4)
+    first, *rest = test.modes
+    across = tuple(replace(point, value=value, cross=0.01) for point in first.shape)
+    tests = [replace(test, modes=(replace(first, shape=across), *rest))]
+    assert 0 not in observed(tests, HANGER_3).design.shape_mode
+    assert any("1 of 6 mode shapes" in each for each in usable(tests, HANGER_3).remarks)
+    assert not any("mode shapes have no value" in each for each in usable([test], HANGER_3).remarks)

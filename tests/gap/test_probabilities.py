@@ -176,3 +176,16 @@ def test_a_law_off_from_mode_to_mode_forgiven() -> None:
     observations = replace(problem.observations, value=away)
     moved = GapProblem(problem.model, problem.tests, observations, problem.described)
     assert allow_for_laws(moved, baseline, fit, rng).gain > 50
+
+
+def test_draws_by_all_laws_are_on_both_sides_of_mid_length() -> None:
+    """Frequencies alone do not tell a place from its mirror image, whatever the law."""
+    mass = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 4.0})
+    problem = problem_of(simulated(mass, seed=3, shape_sd=float("nan")))
+    rng = np.random.default_rng(1)
+    fit = fit_of(problem, Hypothesis((("point_mass", Variant()),)))
+    assert len(fit.peaks) > 1
+    found = allow_for_laws(problem, fit_alone(problem, rng), fit, rng)
+    off = found.draws[(found.draws != fit.draws).any(axis=1)]
+    place_m = problem.coordinates(fit.hypothesis).effect_values(off)[:, 1]
+    assert 0.3 < np.mean(place_m < HANGER.length_m / 2) < 0.7

@@ -126,7 +126,8 @@ def without_gap(no_gap: float, rms_z: float = 1.0, rms_percent: float = 0.1) -> 
 def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
     found = judge(diagnosis)
     assert (found.outcome, found.reason) == (Outcome.NO_GAP, reason)
-    assert found.claim is found.runner_up is None
+    assert found.claim is None
+    assert (found.runner_up is not None) == (reason == "less probable than not")
     assert found.probability == diagnosis.no_gap_probability
 
 

@@ -69,6 +69,7 @@ def _remark_on_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         remark_on_rounding(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
+        _without_own_plane(tests),
         _amplitude(tests),
         _rattling(tests),
         _unused_readings(tests),
@@ -143,6 +144,17 @@ def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
     return (
         f"{missing} of {len(points)} points of mode shapes have no standard deviation (0 is none): "
         f"they are not used, and what only shapes show stays hidden."
+    )
+
+
+def _without_own_plane(tests: Sequence[ModalTest]) -> str:
+    shapes = [mode.shape for test in tests for mode in test.modes if mode.shape]
+    missing = sum(not any(math.isfinite(p.value) and p.value for p in shape) for shape in shapes)
+    if not missing:
+        return ""
+    return (
+        f"{missing} of {len(shapes)} mode shapes have no value in their mode's own plane: they are "
+        "not used."
     )
 
 

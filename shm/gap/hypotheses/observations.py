@@ -176,7 +176,10 @@ def _tension_shifts(tests: Sequence[ModalTest], assumed: Assumptions) -> FloatAr
 
 
 def _components(index: int, mode: Mode) -> list[_Component]:
-    """Return the usable components of a mode's shape; none where fewer than two are left."""
+    """Return the usable components of a mode's shape.
+
+    None where fewer than two are left, or none in the mode's own plane.
+    """
     plane = PLANES.index(mode.plane)
     both = [
         _Component(index, point.x_m, axis, value, point.sd)
@@ -184,7 +187,8 @@ def _components(index: int, mode: Mode) -> list[_Component]:
         for axis, value in ((plane, point.value), (1 - plane, point.cross))
     ]
     usable = [each for each in both if np.isfinite([each.value, each.sd]).all() and each.sd > 0]
-    return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
+    has_own = any(each.axis == plane and each.value != 0 for each in usable)
+    return usable if len(usable) > 1 and has_own else []
 
 
 def _with_errors(shape: list[_Component], error: float) -> tuple[list[_Component], float]:
