@@ -61,7 +61,7 @@ SIGNATURES = {
 NOUNS = {
     "AddedMass", "Diagnosis", "FrequencyResponse", "GapCheck", "Hanger", "Identification",
     "ModalTest", "Mode", "PlantedEffect", "Posterior", "Prior", "Reading", "Recording", "Selection",
-    "ShmError", "Simulator", "SimulatorEffect",
+    "ShapePoint", "ShmError", "Simulator", "SimulatorEffect",
 }  # fmt: skip
 
 
