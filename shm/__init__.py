@@ -24,8 +24,8 @@ In a notebook, from a recording to the tension and what limits it::
 - `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF; of a value by itself, its
   `summary()`, `to_dataframe()`, `to_arviz()` do.
 - The nouns that flow between the steps are frozen dataclasses: `Recording`, `FrequencyResponse`,
-  `Identification`, `ModalTest`, `Mode`, `AddedMass`, `Posterior`, `Selection`, `Diagnosis`,
-  `GapCheck`.
+  `Identification`, `ModalTest`, `Mode`, `ShapePoint`, `AddedMass`, `Posterior`, `Selection`,
+  `Diagnosis`, `GapCheck`.
 - What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
 
 SI units throughout (N, m, kg, s, Hz), temperatures in deg C, unknown numbers NaN. The same seed
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from shm.values import Recording as Recording
     from shm.values import Selection as Selection
 
-__version__ = "1.0.0"
+__version__ = "2.0.0"
 
 _STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
