@@ -122,8 +122,7 @@ def check_text(check: GapCheck) -> list[str]:
     """Return what is said below the table, a paragraph each."""
     limit = (
         "The limit lies between the largest that was missed and the smallest that is found. "
-        "The twin follows the model of the diagnosis exactly, so that on the bridge these are "
-        "lower limits of the size."
+        "The twin follows the model of the diagnosis exactly: on the bridge it may take more."
     )
     hidden = invisible_words(check)
     lines = [stopped_words(check), sound_words(check), limit]
