@@ -36,7 +36,9 @@ def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> N
 
     for one, other in itertools.combinations(watchers, 2):
         assert one.key != other.key
-    stricter = Watcher(PLANES_ALONE, columns(), replace(HANGER_3, thresholds=limits), OPTIONS)
+    stricter = Watcher(
+        PLANES_ALONE, columns(len(PLANES_ALONE)), replace(HANGER_3, thresholds=limits), OPTIONS
+    )
     assert stricter.key == WATCHER.key
 
 

@@ -32,6 +32,8 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
+UNMEASURED = 1e8
+"""Technical: the variance of a mode that was not measured; no log frequency is 1e4."""
 SAMPLES = 500
 """Of a summary: a probability of a half is known to 0.02, a mean to a twentieth of its sd."""
 
@@ -50,10 +52,7 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    # Technical: the variance of a mode that was not measured; no log frequency is 1e4
-    its = np.where(np.isfinite(variances), variances, 1e8)
-    n = values.shape[1]
-    joint = covariance + its[:, None, :, None] * np.eye(n)
+    joint = joint_covariance(variances, covariance)
     weight = np.linalg.inv(joint)
     weighted = weight @ columns[:, None]
     of_values = np.einsum("tkij,tj->tki", weight, values)
@@ -63,6 +62,12 @@ def sums_of(
         np.einsum("tki,tiz->tkz", of_values, columns),
         constant,
     )
+
+
+def joint_covariance(variances: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the covariance (T, K, n, n) of tests, their own `variances` (T, n) included."""
+    its = np.minimum(variances, UNMEASURED)
+    return np.asarray(covariance + its[:, None, :, None] * np.eye(its.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -314,7 +314,7 @@ class Limits:
     # ---- watcher
     # To be raised whenever the same readings give other results than before: kept states are void
     # then.
-    version: int = 16
+    version: int = 17
     # Technical: what a test says goes nearly in proportion to its weight.
     most_repeats: int = 6
     nearly: float = 0.5

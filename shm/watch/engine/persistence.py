@@ -115,15 +115,16 @@ def _of_baseline(seen: Seen, first: int) -> BoolArray:
 
 def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -> float:
     """Return the probability that a test is a blunder, by the nearest of the last that count."""
-    odds = np.log(prior / (1 - prior))
+    odds, tail = np.log(prior / (1 - prior)), LIMITS.persistence_tail
     against = []
     for before in np.flatnonzero(known[:test])[-LIMITS.before :]:
         square, d = seen.distance(test, int(before))
         if d:
-            wide = -(LIMITS.persistence_tail + d) / 2 * np.log1p(
-                square / LIMITS.persistence_tail / LIMITS.wider**2
-            ) - d * np.log(LIMITS.wider)
-            against.append(wide + square / 2)
+            # Student's density over the normal one, both of d modes
+            size = scipy.special.gammaln((tail + d) / 2) - scipy.special.gammaln(tail / 2)
+            size -= d * np.log(LIMITS.wider * math.sqrt(tail / 2))
+            wide = (tail + d) / 2 * np.log1p(square / tail / LIMITS.wider**2)
+            against.append(size - wide + square / 2)
     if not against:
         return prior
     return float(1 / (1 + np.exp(-np.clip(odds + min(against), -700, 700))))
@@ -141,14 +142,16 @@ class Course:
     """Tests mode by mode: what the evidence is the sum of.
 
     `rows` (T, n, z) are the null's columns and those of called changes, `changing` (T, n, n + q)
-    the columns of a change, `values` and `variances` (T, n), infinite where not measured. The first
-    `baseline` are the baseline's.
+    the columns of a change, `values` (T, n) and their `covariance` (T, K, n, n) in the evidence;
+    `errors` (T, n) are the variances of each mode by itself. The first `baseline` are the
+    baseline's.
     """
 
     rows: FloatArray
     changing: FloatArray
     values: FloatArray
-    variances: FloatArray
+    covariance: FloatArray
+    errors: FloatArray
     baseline: int
 
 
@@ -232,10 +235,20 @@ def _shown(
     The latter is that of any log frequency.
     """
     change, null = evidence.mean_of(index)
-    measured = np.isfinite(course.variances)
-    weight = np.where(measured, 1 / np.where(measured, course.variances, 1.0), 0.0)
-    moves = course.changing @ change
-    rest = course.values - course.rows @ null
-    strength = np.maximum((weight * moves**2).sum(axis=1), 1e-12)
-    largest = float(np.abs(moves).max(initial=0.0))
-    return (weight * moves * rest).sum(axis=1) / strength, strength**-0.5, largest
+    moves, rest = course.changing @ change, course.values - course.rows @ null
+    shown, sd = fraction_shown(moves, rest, course.covariance[:, index[1]], course.errors)
+    return shown, sd, float(np.abs(moves).max(initial=0.0))
+
+
+def fraction_shown(
+    moves: FloatArray, rest: FloatArray, covariance: FloatArray, errors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the fraction of `moves` (T, n) that each test's `rest` (T, n) shows, and its sd (T,).
+
+    By generalised least squares with the `covariance` (T, n, n) of the evidence; the sd is that by
+    the `errors` (T, n) of each mode alone (record 0029).
+    """
+    weight = np.linalg.solve(covariance, moves[..., None])[..., 0]
+    strength = np.maximum((weight * moves).sum(axis=1), 1e-12)
+    sd = np.sqrt((weight**2 * errors).sum(axis=1)) / strength
+    return (weight * rest).sum(axis=1) / strength, sd
