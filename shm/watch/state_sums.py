@@ -26,7 +26,6 @@ from shm.values import (
 from shm.watch.engine.causes import DetectedChange, Structure
 from shm.watch.engine.change_point import (
     SIZES,
-    UNMEASURED,
     Evidence,
     Sums,
     joint_covariance,
@@ -173,7 +172,7 @@ class StateSums:
         values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
         factors = np.where(known, self._factors, 0.0)
         open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
-        its = np.minimum(spread, UNMEASURED)[:, :, None] * np.eye(len(spread.T))
+        its = np.minimum(spread, LIMITS.unmeasured)[:, :, None] * np.eye(len(spread.T))
         covariance = its + open_left @ np.swapaxes(open_left, 1, 2)
         there = np.abs(factors).max(axis=1) > 0
         variance = np.maximum(state.scatter_variance, 1e-12)
@@ -259,7 +258,9 @@ class StateSums:
             columns[:, :, layout.change],
             self._softened(state, rows),
             joint_covariance(state.modes.variances[rows], self._covariance(state, rows)),
-            np.minimum(state.modes.variances[rows] + self.options.mode_scatter**2, UNMEASURED),
+            np.minimum(
+                state.modes.variances[rows] + self.options.mode_scatter**2, LIMITS.unmeasured
+            ),
             int((rows < self.options.baseline_tests).sum()),
         )
 

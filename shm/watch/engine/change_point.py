@@ -32,8 +32,6 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
-UNMEASURED = 1e8
-"""Technical: the variance of a mode that was not measured; no log frequency is 1e4."""
 SAMPLES = 500
 """Of a summary: a probability of a half is known to 0.02, a mean to a twentieth of its sd."""
 
@@ -66,7 +64,7 @@ def sums_of(
 
 def joint_covariance(variances: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the covariance (T, K, n, n) of tests, their own `variances` (T, n) included."""
-    its = np.minimum(variances, UNMEASURED)
+    its = np.minimum(variances, LIMITS.unmeasured)
     return np.asarray(covariance + its[:, None, :, None] * np.eye(its.shape[1]))
 
 

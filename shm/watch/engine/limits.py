@@ -73,6 +73,7 @@ class Limits:
     correlation: float = 0.8
 
     # ---- change point
+    unmeasured: float = 1e8  # technical: variance of a mode not measured; no log frequency is 1e4
     a_week_years: float = 7 / 365.25
     change_point_leading: int = 24  # technical: changes that draws are of, the most probable
 

@@ -246,7 +246,7 @@ def fraction_shown(
     """Return the fraction of `moves` (T, n) that each test's `rest` (T, n) shows, and its sd (T,).
 
     By generalised least squares with the `covariance` (T, n, n) of the evidence; the sd is that by
-    the `errors` (T, n) of each mode alone (record 0029).
+    the `errors` (T, n) of each mode alone (record 0037).
     """
     weight = np.linalg.solve(covariance, moves[..., None])[..., 0]
     strength = np.maximum((weight * moves).sum(axis=1), 1e-12)
