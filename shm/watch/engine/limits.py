@@ -135,8 +135,6 @@ class Limits:
     near: int = 2  # tests to each side: a blunder may lie between two that agree
     before: int = 5  # counted tests that say where the hanger was
     agreeing: float = 0.4  # judgement: of those before; two of five
-    # Of a log frequency (judgement): nearer than orders are.
-    same: float = 0.02
     wider: float = 10.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
     persistence_tail: float = 2.0
     shown: float = 0.5  # of a change: half of it or more is nearer to it than to none

@@ -1,8 +1,7 @@
 """Select tests that count, and bound the evidence of a change by whether it stays.
 
-A test counts where it agrees with what was before it or with a test next to it, and none of its
-modes strays. So a blunder counts in nothing as long as it is alone, and what lasts counts from its
-second test on.
+A test counts where it agrees with what was before it or with a test next to it. So a blunder
+counts in nothing as long as it is alone, and what lasts counts from its second test on.
 
 The sums of `change_point` take tests to scatter normally. They do not: vans and joints that give
 for a day are many more than a normal law has. So a change has no more evidence than the tests after
@@ -13,7 +12,6 @@ tests before did. Or it is those before that were odd, where they are few.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,22 +79,9 @@ def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -
             if step and 0 <= test + step < tests
         ]
         near = [each for each in near if each >= first]
-        agrees = agreeing >= LIMITS.agreeing * len(before) or any(seen.agree(test, n) for n in near)
-        found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
+        agrees = agreeing >= LIMITS.agreeing * len(before)
+        found[test] = agrees or any(seen.agree(test, each) for each in near)
     return found
-
-
-def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
-    """Return True if a mode lies where no counted test before has it, and none next to it."""
-    for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
-        measured = np.isfinite(seen.variances[:, mode])
-        before = np.flatnonzero(found[:test] & measured[:test])[-LIMITS.before :]
-        its, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(its - np.median(others[before])) <= LIMITS.large:
-            continue
-        if not any(measured[each] and abs(its - others[each]) < LIMITS.same for each in near):
-            return True
-    return False
 
 
 def _of_baseline(seen: Seen, first: int) -> BoolArray:
