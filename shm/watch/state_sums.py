@@ -25,7 +25,9 @@ from shm.values import (
 )
 from shm.watch.engine.causes import DetectedChange, Structure
 from shm.watch.engine.change_point import (
+    RAMP,
     SIZES,
+    STEP,
     Evidence,
     Sums,
     joint_covariance,
@@ -292,7 +294,11 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
 
 
 def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> DetectedChange:
-    """Return a called change: the likeliest beginning, each cause as probable as it was then."""
+    """Return a called change, each cause as probable as it was then.
+
+    Of the kind that is called, it begins where that is likeliest: the other kind may begin where
+    this one is out of the question.
+    """
     layout = evidence.layout
     least = np.concatenate(
         [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
@@ -302,6 +308,8 @@ def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> Detec
     for direction, by_size in zip(evidence.directions, shares, strict=True):
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T
-    first = int(evidence.beginnings[int(evidence.shares.sum(axis=(1, 2, 3, 4)).argmax())])
-    years, is_ramp = float(evidence.years[first - 1]), bool(change.sudden < 0.5)
+    is_ramp = bool(change.sudden < 0.5)
+    of_kind = evidence.shares[:, :, RAMP if is_ramp else STEP].sum(axis=(1, 2, 3))
+    first = int(evidence.beginnings[int(of_kind.argmax())])
+    years = float(evidence.years[first - 1])
     return DetectedChange(int(rows[first]), years, is_ramp, np.linalg.inv(covariance))
