@@ -168,7 +168,8 @@ NOTHING_WATCHED = StatesOverTime((), np.empty(0), NAN, np.empty(0, bool), ())
 def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
     """Return the states of a hanger at all tests, at the baseline's mean temperature."""
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
-    explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
+    columns = watched.reader.columns
+    explained = np.array([not off_the_baseline(each, columns).any() for each in watched.readings])
     calls = [call.change for call in watched.watch.calls]
     reference_c = watched.reader.reference_temperature_c
     options = StateOptions.of(hanger.assumptions, reference_temperature_c=reference_c)

@@ -115,15 +115,14 @@ class WatchedQuantity:
 class ModeReading:
     """One test mode by mode: log frequencies (modes,) of the baseline's modes beside the model's.
 
-    `values` are about `slopes` (modes, q) times the coordinates: linearised where the test lies.
-    `variances` are infinite of a mode that the test lacks, or that is taken for a mistaken one
-    (`mistaken`). `per_kelvin` (modes,) is what a kelvin does to each as steel softens, taken off
-    where the temperature is known.
+    `values` (modes,) are linear in the coordinates, by the slopes at the baseline for all tests
+    (record 0037). `variances` are infinite of a mode that the test lacks, or that is taken for a
+    mistaken one (`mistaken`). `per_kelvin` (modes,) is what a kelvin does to each as steel softens,
+    taken off where the temperature is known.
     """
 
     values: FloatArray
     variances: FloatArray
-    slopes: FloatArray
     per_kelvin: FloatArray
     mistaken: BoolArray
 

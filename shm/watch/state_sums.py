@@ -24,7 +24,16 @@ from shm.values import (
     is_ratio,
 )
 from shm.watch.engine.causes import DetectedChange, Structure
-from shm.watch.engine.change_point import SIZES, Evidence, Sums, select_null, sums_of
+from shm.watch.engine.change_point import (
+    RAMP,
+    SIZES,
+    STEP,
+    Evidence,
+    Sums,
+    joint_covariance,
+    select_null,
+    sums_of,
+)
 from shm.watch.engine.limits import LIMITS
 from shm.watch.engine.options import (
     OF_ONE_VISIT_YEARS,
@@ -97,12 +106,10 @@ class StateSums:
     structure: Structure
     options: WatchOptions
 
-    def _factors(self, state: WatchState) -> FloatArray:
-        """Along what each test scatters (T, n, q + c)."""
-        fixed = np.broadcast_to(
-            self.structure.scattering, (state.tests, *self.structure.scattering.shape)
-        )
-        return np.concatenate([state.modes.slopes, fixed], axis=2)
+    @cached_property
+    def _factors(self) -> FloatArray:
+        """Along what tests scatter (n, q + c)."""
+        return np.hstack([self.structure.slopes, self.structure.scattering])
 
     def _warmth(self, state: WatchState) -> Warmth:
         return temperature_offsets(
@@ -123,10 +130,11 @@ class StateSums:
         open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
         share what they miss."""
         its, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
-        softening, parts = state.modes.per_kelvin, []
+        softening, slopes, parts = state.modes.per_kelvin, self.structure.slopes, []
         for law, mean, sd in zip(self._thermal(state), its, sds, strict=True):
-            known = softening + state.modes.slopes @ mean
-            per_kelvin = np.concatenate([known[:, :, None], state.modes.slopes * sd], axis=2)
+            known = (softening + slopes @ mean)[:, :, None]
+            unknown = np.broadcast_to(slopes * sd, (state.tests, *slopes.shape))
+            per_kelvin = np.concatenate([known, unknown], axis=2)
             off = law.sd * np.sqrt(law.shared) if of_season else law.sd
             parts.append(off[:, None, None] * per_kelvin)
             softening = np.zeros_like(softening)  # steel's goes with the first law
@@ -134,14 +142,12 @@ class StateSums:
 
     def seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
-        factors = self._factors(state)
-        measured = np.flatnonzero(np.isfinite(state.modes.variances).any(axis=1))
         variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
             values=self._at_rest(state),
             variances=state.modes.variances,
             doubt=self._doubt(state),
-            factors=factors[measured[-1]] if len(measured) else factors[-1],
+            factors=self._factors,
             sds=np.sqrt(variance),
         )
 
@@ -149,7 +155,7 @@ class StateSums:
         laws, its = self._thermal(state), self._by_law(state.coefficients)
         variation = laws[0].kelvin[:, None] * state.modes.per_kelvin
         for law, mean in zip(laws, its, strict=True):
-            variation = variation + law.kelvin[:, None] * (state.modes.slopes @ mean)
+            variation = variation + law.kelvin[:, None] * (self.structure.slopes @ mean)
         return np.asarray(state.modes.values - variation)
 
     def scatter(self, state: WatchState) -> FloatArray:
@@ -166,10 +172,9 @@ class StateSums:
         spread = variances[1:] + variances[:-1]
         known = np.isfinite(spread)[:, :, None]
         values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
-        factors = np.where(known, self._factors(state)[rows[1:]], 0.0)
+        factors = np.where(known, self._factors, 0.0)
         open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
-        # Technical: no log frequency differs by 1e4
-        its = np.where(np.isfinite(spread), spread, 1e8)[:, :, None] * np.eye(len(spread.T))
+        its = np.minimum(spread, LIMITS.unmeasured)[:, :, None] * np.eye(len(spread.T))
         covariance = its + open_left @ np.swapaxes(open_left, 1, 2)
         there = np.abs(factors).max(axis=1) > 0
         variance = np.maximum(state.scatter_variance, 1e-12)
@@ -195,15 +200,16 @@ class StateSums:
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
         layout = self.structure.layout
-        slopes, level = state.modes.slopes[rows], _levels(state.log_amplitude[rows])
+        level = np.nan_to_num(_levels(state.log_amplitude[rows]))[:, None, None]
+        slopes = np.broadcast_to(self.structure.slopes, (len(rows), layout.n, layout.q))
         creeping = [is_ratio(each.name) for each in self.quantities]
         return np.concatenate(
             [
                 np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
                 slopes,
                 *(slopes * each.kelvin[rows, None, None] for each in self._thermal(state)),
-                slopes * np.nan_to_num(level)[:, None, None],
-                self.structure.stiffening[:, None] * np.nan_to_num(level)[:, None, None],
+                slopes * level,
+                self.structure.stiffening[:, None] * level,
                 slopes[:, :, creeping].sum(axis=2, keepdims=True) * state.years[rows, None, None],
             ],
             axis=2,
@@ -218,55 +224,55 @@ class StateSums:
 
     def sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
-        structure, layout = self.structure, self.structure.layout
-        years = state.years[rows]
-        apart = np.abs(years[:, None] - years)
-        of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
-        of_level = layout.prior_sd[-2 - layout.q : -1]  # before creep
-        stiffening = np.broadcast_to(structure.stiffening[:, None], (len(rows), layout.n, 1))
-        moving = np.concatenate([state.modes.slopes[rows], stiffening], axis=2)
-        unknown = moving * (self.options.unknown_log_amplitude_sd * of_level)
-        unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
-        doubt = self._doubt(state, of_season=True)[rows]
-        open_left = np.concatenate([unknown, doubt], axis=2)
-        common = open_left @ np.swapaxes(open_left, 1, 2)
-        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
-        spread = factors @ np.swapaxes(factors, 1, 2)
-        scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
-        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
-        if structure.wander.size:
-            together = (apart < structure.wander_years).sum(axis=1)
-            slow = structure.scales[:, None, None] ** 2 * structure.wander @ structure.wander.T
-            covariance = covariance + together[:, None, None, None] * slow
         wider = 1 / state.weight[rows]
         return sums_of(
             self._columns(state, rows),
             self._softened(state, rows),
             wider[:, None] * state.modes.variances[rows],
-            wider[:, None, None, None] * covariance,
+            wider[:, None, None, None] * self._covariance(state, rows),
         )
+
+    def _covariance(self, state: WatchState, rows: IntArray) -> FloatArray:
+        """Return by what the tests `rows` differ beside their errors (T, K, n, n)."""
+        structure, years = self.structure, state.years[rows]
+        apart = np.abs(years[:, None] - years)
+        of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
+        of_level = structure.layout.prior_sd[-2 - structure.layout.q : -1]  # before creep
+        moving = np.hstack([structure.slopes, structure.stiffening[:, None]])
+        moving = moving * (self.options.unknown_log_amplitude_sd * of_level)
+        is_known = np.isfinite(state.log_amplitude[rows])[:, None, None]
+        unknown = np.where(is_known, 0.0, moving)
+        doubt = self._doubt(state, of_season=True)[rows]
+        open_left = np.concatenate([unknown, doubt], axis=2)
+        common = open_left @ np.swapaxes(open_left, 1, 2)
+        squares = structure.scales[:, None, None] ** 2
+        scatter = squares * ((self._factors * state.scatter_variance) @ self._factors.T)
+        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
+        together = (apart < structure.wander_years).sum(axis=1)
+        slow = squares * (structure.wander @ structure.wander.T)
+        return np.asarray(covariance + together[:, None, None, None] * slow)
 
     def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
         """Return the tests `rows` with what the null says of each, called changes included."""
         layout, columns = self.structure.layout, self._columns(state, rows)
-        its = self.options.mode_scatter**2
         return Course(
             columns @ select_null(state.years[rows], layout, called),
             columns[:, :, layout.change],
             self._softened(state, rows),
-            state.modes.variances[rows] + its,
+            joint_covariance(state.modes.variances[rows], self._covariance(state, rows)),
+            np.minimum(
+                state.modes.variances[rows] + self.options.mode_scatter**2, LIMITS.unmeasured
+            ),
             int((rows < self.options.baseline_tests).sum()),
         )
 
-    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
+    @cached_property
+    def effects(self) -> tuple[FloatArray, FloatArray]:
         """Return what a change does to what owners look at, and to every mode (`effects_of`)."""
         if not self.structure.is_modelled:
             every = np.eye(self.structure.layout.n)
             return np.hstack([every, every]), np.hstack([every, every])
-        measured = np.isfinite(state.modes.variances)
-        count = np.maximum(measured.sum(axis=0), 1)[:, None]
-        slopes = np.where(measured[:, :, None], state.modes.slopes, 0.0).sum(axis=0) / count
-        return effects_of(self.modes, slopes)
+        return effects_of(self.modes, self.structure.slopes)
 
 
 def effects_of(modes: Sequence[MeasuredMode], slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -288,7 +294,11 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
 
 
 def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> DetectedChange:
-    """Return a called change: the likeliest beginning, each cause as probable as it was then."""
+    """Return a called change, each cause as probable as it was then.
+
+    Of the kind that is called, it begins where that is likeliest: the other kind may begin where
+    this one is out of the question.
+    """
     layout = evidence.layout
     least = np.concatenate(
         [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
@@ -298,6 +308,8 @@ def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> Detec
     for direction, by_size in zip(evidence.directions, shares, strict=True):
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T
-    first = int(evidence.beginnings[int(evidence.shares.sum(axis=(1, 2, 3, 4)).argmax())])
-    years, is_ramp = float(evidence.years[first - 1]), bool(change.sudden < 0.5)
+    is_ramp = bool(change.sudden < 0.5)
+    of_kind = evidence.shares[:, :, RAMP if is_ramp else STEP].sum(axis=(1, 2, 3))
+    first = int(evidence.beginnings[int(of_kind.argmax())])
+    years = float(evidence.years[first - 1])
     return DetectedChange(int(rows[first]), years, is_ramp, np.linalg.inv(covariance))

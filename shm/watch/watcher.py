@@ -204,7 +204,7 @@ class Watcher:
             self.options,
             state.readings[0].time,
             of_baseline,
-            *self.sums.effects(state),
+            *self.sums.effects,
         )
         outlier = outlier_probability(
             self.sums.seen(state),
@@ -256,7 +256,7 @@ class Watcher:
             raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
         if reading.modes is None:
             nothing, unknown = np.zeros(n), np.full(n, np.inf)
-            blind = ModeReading(nothing, unknown, np.zeros((n, q)), nothing, np.zeros(n, bool))
+            blind = ModeReading(nothing, unknown, nothing, np.zeros(n, bool))
             reading = replace(reading, modes=blind)
         is_known = state.reference_c == state.reference_c
         later = replace(

@@ -162,7 +162,7 @@ def watch_hanger(
         tests = list(watcher.watch(state, readings)[1].tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n, reading in enumerate(readings):
-        mistaken = repeated_mistakes(mistaken, reading, reader.modes)
+        mistaken = repeated_mistakes(mistaken, reading, reader.columns)
         tests[n] = replace(tests[n], mistaken=mistaken)
     return Watched(reader, (*first, *readings), Watch((*watch.tests, *tests)))
 
@@ -231,7 +231,8 @@ def watch_newest(
     for test, time in later:
         reading = reader.reading(test, max(time, since))
         state, found = watcher.after(state, reading)
-        found = replace(found, mistaken=repeated_mistakes(reported.mistaken, reading, reader.modes))
+        mistaken = repeated_mistakes(reported.mistaken, reading, reader.columns)
+        found = replace(found, mistaken=mistaken)
         reported, alert = after(reported, found, hanger)
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:

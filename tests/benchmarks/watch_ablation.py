@@ -88,7 +88,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     ],
     "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
     "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
-    "modes that stray": [(persistence, "_has_outlying_mode", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],

@@ -112,7 +112,7 @@ def go_wild_each_its_way() -> Sequence[Reading]:
 
 def hang_mass() -> Sequence[Reading]:
     """Return readings of a hanger on which a mass was put."""
-    of_mass, _ = columns().by_cause["point_mass"][4]
+    of_mass, _ = columns(1).by_cause["point_mass"][4]
     return change([0.0], 4, outliers=0, mode_step=3 * of_mass).readings(0)
 
 

@@ -71,16 +71,17 @@ def slopes(q: int) -> FloatArray:
 
 
 @cache
-def columns() -> Columns:
+def columns(q: int) -> Columns:
     """What other causes do to the frequencies of a thick rod on springs of 10^7 N m/rad."""
     base = np.array([1.0, 1.0, 7.0, 7.0, 7.0, 7.0])
-    return columns_of(described("beam2", HANGER_3), base, HANGER_3, MODES)
+    found = columns_of(described("beam2", HANGER_3), base, HANGER_3, MODES)
+    return replace(found, slopes=slopes(q))
 
 
 def watcher(
     quantities: tuple[WatchedQuantity, ...], options: WatchOptions | None = None
 ) -> Watcher:
-    return Watcher(quantities, columns(), HANGER_3, options or WatchOptions())
+    return Watcher(quantities, columns(len(quantities)), HANGER_3, options or WatchOptions())
 
 
 def watch_of(
@@ -89,7 +90,7 @@ def watch_of(
     options: WatchOptions | None = None,
 ) -> Watch:
     chosen = options or WatchOptions.of(HANGER_3.assumptions)
-    watcher = Watcher(quantities, columns(), HANGER_3, chosen)
+    watcher = Watcher(quantities, columns(len(quantities)), HANGER_3, chosen)
     if not readings:
         return Watch(())
     state, begun = watcher.begin(readings[: chosen.baseline_tests])
@@ -162,7 +163,6 @@ def reading(
     modes = ModeReading(
         values=values,
         variances=np.full(n, FREQUENCY_SD**2),
-        slopes=slopes(len(x)),
         per_kelvin=np.zeros(n),
         mistaken=np.zeros(n, bool),
     )
@@ -173,8 +173,9 @@ def reading(
 
 def with_modes(given: Reading, modes: ModeReading) -> Reading:
     """The same of other modes: mean and information are what these say together."""
-    weighted = modes.slopes / modes.variances[:, None]
-    information = weighted.T @ modes.slopes
+    its = slopes(len(given.mean))
+    weighted = its / modes.variances[:, None]
+    information = weighted.T @ its
     mean = np.linalg.pinv(information, rcond=1e-9) @ (weighted.T @ modes.values)
     return replace(given, modes=modes, mean=mean, information=information)
 

@@ -85,6 +85,8 @@ def test_what_has_changed_is_read_without_bias(reader: Reader, theta: tuple[floa
     truth = coordinates(reader, theta)
     assert distance(reading, truth) < 0.01
     assert reading.mean[0] == pytest.approx(truth[0], abs=2e-4)
+    assert reading.modes is not None
+    assert reading.modes.values == pytest.approx(reader.columns.slopes @ truth, abs=3e-4)
 
 
 def test_a_test_of_conditions_beyond_the_class_says_nothing(reader: Reader) -> None:

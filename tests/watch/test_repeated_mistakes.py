@@ -8,14 +8,15 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
+from shm.watch.engine.causes import Columns
 from shm.watch.engine.kept_state import from_bytes, to_bytes
-from shm.watch.engine.quantities import MeasuredMode
 from shm.watch.watching import AlertState, after
 from shm.watch.words.notices import repeated_mistakes
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
 
-MODES: list[MeasuredMode] = [("transverse", 1), ("transverse", 2), ("longitudinal", 1)]
+MODES = (("transverse", 1), ("transverse", 2), ("longitudinal", 1))
+THREE = Columns(MODES, {}, np.zeros((3, 3)), slopes=np.zeros((3, 1)))
 START = datetime(2026, 5, 1, tzinfo=UTC)
 
 
@@ -24,7 +25,7 @@ def reading(number: int, wrong: str = "...", lacks: str = "...") -> Reading:
     mistaken = np.array([each == "x" for each in wrong])
     absent = np.array([each == "x" for each in lacks])
     variances = np.where(mistaken | absent, np.inf, 1e-6)
-    modes = ModeReading(np.zeros(3), variances, np.zeros((3, 1)), np.zeros(3), mistaken)
+    modes = ModeReading(np.zeros(3), variances, np.zeros(3), mistaken)
     time = START + timedelta(days=number)
     return Reading(f"t{number}", time, 10.0, np.zeros(1), np.eye(1), modes=modes)
 
@@ -32,12 +33,17 @@ def reading(number: int, wrong: str = "...", lacks: str = "...") -> Reading:
 def misfitting(number: int) -> Reading:
     """Of eight modes, five of which are off by 2 to 6 % in no order that a tension makes."""
     off = np.array([0.02, 0.0, -0.04, 0.03, 0.0, -0.06, 0.04, 0.0])
-    modes = ModeReading(off, np.full(8, 1e-4), np.ones((8, 1)), np.zeros(8), np.zeros(8, bool))
+    modes = ModeReading(off, np.full(8, 1e-4), np.zeros(8), np.zeros(8, bool))
     time = START + timedelta(days=number)
     return Reading(f"t{number}", time, 10.0, np.zeros(1), np.eye(1), modes=modes)
 
 
-EIGHT: list[MeasuredMode] = [("transverse", order) for order in range(1, 9)]
+EIGHT = Columns(
+    tuple(("transverse", order) for order in range(1, 9)),
+    {},
+    np.zeros((8, 8)),
+    slopes=np.ones((8, 1)),
+)
 
 
 def test_tests_that_do_not_fit_the_baseline_are_one_notice_which_names_no_mode() -> None:
@@ -69,7 +75,7 @@ def rung(wrong: str) -> list[int]:
     """In which tests a notice of the second mode came, `x` being those that have it wrong."""
     told, mistaken, rings = AlertState(), (), []
     for number, each in enumerate(wrong):
-        mistaken = repeated_mistakes(mistaken, reading(number, f".{each}."), MODES)
+        mistaken = repeated_mistakes(mistaken, reading(number, f".{each}."), THREE)
         test = replace(watched(number, 0), mistaken=mistaken)
         told, alert = after(told, test, HANGER_3)
         told = from_bytes(AlertState, to_bytes(told))

@@ -106,13 +106,15 @@ class Columns:
     One unit or one sd of each: (places, r, n) by name.
 
     `sensors` (n, n) is the covariance that a test's sensors, put elsewhere each time, give,
-    `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean.
+    `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean,
+    `slopes` (n, q) what each watched quantity does at the baseline.
     """
 
     modes: tuple[MeasuredMode, ...]
     by_cause: dict[str, FloatArray]
     sensors: FloatArray
     loosening: tuple[FloatArray, ...] = ()
+    slopes: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def mounted_kg(hanger: Hanger) -> float:
@@ -200,14 +202,15 @@ def _columns_on(
 class Structure:
     """The hypotheses of a hanger: the layout of columns, directions of change, and scatters.
 
-    Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
-    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
-    `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
+    Tests scatter along the quantities' `slopes` (n, q) and along `scattering` (n, c) by variances
+    (q + c,) that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that.
+    Along `wander` (n, w) they differ slowly: all within `wander_years` of one have it alike.
     Quantities go with the temperature by `thermal_laws` coefficients each, the second of frost.
     Where it is not `is_modelled`, each frequency counts: which of them matters no model says.
     """
 
     layout: Layout
+    slopes: FloatArray
     directions: tuple[Direction, ...]
     scattering: FloatArray
     stiffening: FloatArray
@@ -254,6 +257,7 @@ def structure_of(
         layout=Layout(
             n, len(steps), np.concatenate([np.ones(n), steps, per_kelvin, per_amplitude, last])
         ),
+        slopes=columns.slopes,
         directions=tuple(_directions(quantities, columns, sensors)),
         scattering=np.hstack([gives * loosening, sensors, stiffer, np.ones((n, 1)), np.eye(n)]),
         stiffening=stiffer[:, 0] / LIMITS.causes_stiffer,

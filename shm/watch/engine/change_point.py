@@ -50,10 +50,7 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    # Technical: the variance of a mode that was not measured; no log frequency is 1e4
-    its = np.where(np.isfinite(variances), variances, 1e8)
-    n = values.shape[1]
-    joint = covariance + its[:, None, :, None] * np.eye(n)
+    joint = joint_covariance(variances, covariance)
     weight = np.linalg.inv(joint)
     weighted = weight @ columns[:, None]
     of_values = np.einsum("tkij,tj->tki", weight, values)
@@ -63,6 +60,12 @@ def sums_of(
         np.einsum("tki,tiz->tkz", of_values, columns),
         constant,
     )
+
+
+def joint_covariance(variances: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the covariance (T, K, n, n) of tests, their own `variances` (T, n) included."""
+    its = np.minimum(variances, LIMITS.unmeasured)
+    return np.asarray(covariance + its[:, None, :, None] * np.eye(its.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,8 +41,9 @@ class FrequencyReader:
             raise BadInput("The first tests hold no mode.", remedy="Give tests with modes.")
         self.modes: tuple[MeasuredMode, ...] = tuple(sorted(found))
         self._level = np.array([float(np.median(found[key])) for key in self.modes])
-        nothing = np.zeros((len(self.modes), len(self.modes)))
-        self.columns = Columns(self.modes, {}, nothing)  # no model says what causes do
+        n = len(self.modes)
+        # No model says what causes do.
+        self.columns = Columns(self.modes, {}, np.zeros((n, n)), slopes=np.eye(n))
         self.quantities = tuple(map(_quantity, self.modes, self._level.tolist()))
 
     @property
@@ -70,7 +71,7 @@ class FrequencyReader:
             temperature_c=reference_of([test.temperature_c for test in tests]),
             mean=values,
             information=np.diag(1 / variances),
-            modes=ModeReading(values, variances, np.eye(n), np.zeros(n), np.zeros(n, dtype=bool)),
+            modes=ModeReading(values, variances, np.zeros(n), np.zeros(n, dtype=bool)),
             amplitude=math.exp(float(np.mean(levels))) if levels else math.nan,
         )
 
@@ -157,6 +158,7 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
     wander = np.hstack([LIMITS.wander * ones[:, None], LIMITS.wander_of_a_mode * np.eye(n)])
     return Structure(
         layout=Layout(n, n, prior_sd),
+        slopes=np.eye(n),
         directions=tuple(directions),
         scattering=ones[:, None],
         scatter_variance=np.append(np.full(n, LIMITS.scatter_of_a_mode), LIMITS.frequencies_scatter)

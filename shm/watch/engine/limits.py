@@ -73,6 +73,7 @@ class Limits:
     correlation: float = 0.8
 
     # ---- change point
+    unmeasured: float = 1e8  # technical: variance of a mode not measured; no log frequency is 1e4
     a_week_years: float = 7 / 365.25
     change_point_leading: int = 24  # technical: changes that draws are of, the most probable
 
@@ -134,8 +135,6 @@ class Limits:
     near: int = 2  # tests to each side: a blunder may lie between two that agree
     before: int = 5  # counted tests that say where the hanger was
     agreeing: float = 0.4  # judgement: of those before; two of five
-    # Of a log frequency (judgement): nearer than orders are.
-    same: float = 0.02
     wider: float = 10.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
     persistence_tail: float = 2.0
     shown: float = 0.5  # of a change: half of it or more is nearer to it than to none
@@ -314,7 +313,7 @@ class Limits:
     # ---- watcher
     # To be raised whenever the same readings give other results than before: kept states are void
     # then.
-    version: int = 16
+    version: int = 17
     # Technical: what a test says goes nearly in proportion to its weight.
     most_repeats: int = 6
     nearly: float = 0.5

@@ -1,8 +1,7 @@
 """Select tests that count, and bound the evidence of a change by whether it stays.
 
-A test counts where it agrees with what was before it or with a test next to it, and none of its
-modes strays. So a blunder counts in nothing as long as it is alone, and what lasts counts from its
-second test on.
+A test counts where it agrees with what was before it or with a test next to it. So a blunder
+counts in nothing as long as it is alone, and what lasts counts from its second test on.
 
 The sums of `change_point` take tests to scatter normally. They do not: vans and joints that give
 for a day are many more than a normal law has. So a change has no more evidence than the tests after
@@ -13,7 +12,6 @@ tests before did. Or it is those before that were odd, where they are few.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,22 +79,9 @@ def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -
             if step and 0 <= test + step < tests
         ]
         near = [each for each in near if each >= first]
-        agrees = agreeing >= LIMITS.agreeing * len(before) or any(seen.agree(test, n) for n in near)
-        found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
+        agrees = agreeing >= LIMITS.agreeing * len(before)
+        found[test] = agrees or any(seen.agree(test, each) for each in near)
     return found
-
-
-def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
-    """Return True if a mode lies where no counted test before has it, and none next to it."""
-    for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
-        measured = np.isfinite(seen.variances[:, mode])
-        before = np.flatnonzero(found[:test] & measured[:test])[-LIMITS.before :]
-        its, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(its - np.median(others[before])) <= LIMITS.large:
-            continue
-        if not any(measured[each] and abs(its - others[each]) < LIMITS.same for each in near):
-            return True
-    return False
 
 
 def _of_baseline(seen: Seen, first: int) -> BoolArray:
@@ -115,15 +100,16 @@ def _of_baseline(seen: Seen, first: int) -> BoolArray:
 
 def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -> float:
     """Return the probability that a test is a blunder, by the nearest of the last that count."""
-    odds = np.log(prior / (1 - prior))
+    odds, tail = np.log(prior / (1 - prior)), LIMITS.persistence_tail
     against = []
     for before in np.flatnonzero(known[:test])[-LIMITS.before :]:
         square, d = seen.distance(test, int(before))
         if d:
-            wide = -(LIMITS.persistence_tail + d) / 2 * np.log1p(
-                square / LIMITS.persistence_tail / LIMITS.wider**2
-            ) - d * np.log(LIMITS.wider)
-            against.append(wide + square / 2)
+            # Student's density over the normal one, both of d modes
+            size = scipy.special.gammaln((tail + d) / 2) - scipy.special.gammaln(tail / 2)
+            size -= d * np.log(LIMITS.wider * math.sqrt(tail / 2))
+            wide = (tail + d) / 2 * np.log1p(square / tail / LIMITS.wider**2)
+            against.append(size - wide + square / 2)
     if not against:
         return prior
     return float(1 / (1 + np.exp(-np.clip(odds + min(against), -700, 700))))
@@ -141,14 +127,16 @@ class Course:
     """Tests mode by mode: what the evidence is the sum of.
 
     `rows` (T, n, z) are the null's columns and those of called changes, `changing` (T, n, n + q)
-    the columns of a change, `values` and `variances` (T, n), infinite where not measured. The first
-    `baseline` are the baseline's.
+    the columns of a change, `values` (T, n) and their `covariance` (T, K, n, n) in the evidence;
+    `errors` (T, n) are the variances of each mode by itself. The first `baseline` are the
+    baseline's.
     """
 
     rows: FloatArray
     changing: FloatArray
     values: FloatArray
-    variances: FloatArray
+    covariance: FloatArray
+    errors: FloatArray
     baseline: int
 
 
@@ -232,10 +220,20 @@ def _shown(
     The latter is that of any log frequency.
     """
     change, null = evidence.mean_of(index)
-    measured = np.isfinite(course.variances)
-    weight = np.where(measured, 1 / np.where(measured, course.variances, 1.0), 0.0)
-    moves = course.changing @ change
-    rest = course.values - course.rows @ null
-    strength = np.maximum((weight * moves**2).sum(axis=1), 1e-12)
-    largest = float(np.abs(moves).max(initial=0.0))
-    return (weight * moves * rest).sum(axis=1) / strength, strength**-0.5, largest
+    moves, rest = course.changing @ change, course.values - course.rows @ null
+    shown, sd = fraction_shown(moves, rest, course.covariance[:, index[1]], course.errors)
+    return shown, sd, float(np.abs(moves).max(initial=0.0))
+
+
+def fraction_shown(
+    moves: FloatArray, rest: FloatArray, covariance: FloatArray, errors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the fraction of `moves` (T, n) that each test's `rest` (T, n) shows, and its sd (T,).
+
+    By generalised least squares with the `covariance` (T, n, n) of the evidence; the sd is that by
+    the `errors` (T, n) of each mode alone (record 0037).
+    """
+    weight = np.linalg.solve(covariance, moves[..., None])[..., 0]
+    strength = np.maximum((weight * moves).sum(axis=1), 1e-12)
+    sd = np.sqrt((weight**2 * errors).sum(axis=1)) / strength
+    return (weight * rest).sum(axis=1) / strength, sd

@@ -341,6 +341,7 @@ class Reader:
         self._scatter = math.hypot(LIMITS.mode_scatter, sensors_kg / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
         self._known: dict[int, tuple[ModalTest, Reading]] = {}
+        self.columns = replace(self.columns, slopes=self._slopes_at_baseline())
         self._residual = np.zeros(len(self.modes))
         self._residual = self._mean_residual([self._seen(test) for test in usable])
 
@@ -371,16 +372,22 @@ class Reader:
         linear, sd = self._likelihood.settled(seen), np.sqrt(seen.variance)
         moved_by = linear.residual + linear.slopes @ linear.x
         mean, information = self._likelihood.read(linear, moved_by)
-        values, variances, slopes = np.zeros(n), np.full(n, np.inf), np.zeros((n, count))
-        values[seen.own] = sd * moved_by
+        values, variances = np.zeros(n), np.full(n, np.inf)
+        values[seen.own] = sd * linear.residual + self.columns.slopes[seen.own] @ linear.x
         # Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
         variances[seen.own] = _error_inflation(linear.residual, count) * seen.variance
-        slopes[seen.own] = sd[:, None] * linear.slopes
         softer = np.zeros(n) if self._is_warmth_known(test) else self._per_kelvin
-        modes = ModeReading(values, variances, slopes, softer, wrong)
+        modes = ModeReading(values, variances, softer, wrong)
         return replace(
             blind, mean=mean, information=information, modes=modes, amplitude=test.amplitude
         )
+
+    def _slopes_at_baseline(self) -> FloatArray:
+        n, (planes, orders) = len(self.modes), zip(*self.modes, strict=True)
+        plane = np.array([PLANES.index(each) for each in planes])
+        order, still = np.array(orders) - 1, np.zeros(len(self.quantities))
+        every = SeenModes(Conditions(), plane, order, np.arange(n), np.zeros(n), np.ones(n))
+        return self._likelihood.linear(still, every).slopes
 
     def _sound(self, seen: SeenModes) -> BoolArray:
         """Return which modes (n,) are not mistaken: more probably good than off by anything.

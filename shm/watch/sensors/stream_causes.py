@@ -81,7 +81,7 @@ def find_cause(
     n = structure.layout.n
     columns = np.zeros((2, n, len(structure.layout.prior_sd)))
     columns[:, :, :n] = np.eye(n)
-    columns[:, :, structure.layout.change][..., n:] = [each.slopes for each in modes]
+    columns[:, :, structure.layout.change][..., n:] = structure.slopes
     wander = wander_sd * columns[:, :, n]
     sums = sums_of(
         columns,
@@ -90,7 +90,7 @@ def find_cause(
         (wander[:, :, None] * wander[:, None] / 2)[:, None],
     )
     evidence = evidence_of(sums, np.array([0.0, 1.0]), 1, structure.layout, structure.directions)
-    effects = effects_of(reader.modes, modes[1].slopes)
+    effects = effects_of(reader.modes, structure.slopes)
     subject = SummaryContext(reader.quantities, hanger, options, _NEVER, 0.0, *effects)
     found = rank_causes(subject, evidence)
     first = {found[0].quantity, *found[0].together}

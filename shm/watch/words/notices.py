@@ -32,9 +32,9 @@ from shm.values.messages import WEEK
 from shm.values.rounding import listed
 from shm.values.stream import StreamEvent
 from shm.watch.agreement import BY_A_LOAD, Agreement, way_of
+from shm.watch.engine.causes import Columns
 from shm.watch.engine.limits import LIMITS
 from shm.watch.engine.mistaken_modes import MOST_MISTAKEN
-from shm.watch.engine.quantities import MeasuredMode
 from shm.watch.words.alert_text import (
     against_baseline_words,
     alert_of,
@@ -124,21 +124,21 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
 
 
 def repeated_mistakes(
-    before: Sequence[RepeatedMistake], reading: Reading, modes: Sequence[MeasuredMode]
+    before: Sequence[RepeatedMistake], reading: Reading, columns: Columns
 ) -> tuple[RepeatedMistake, ...]:
     """Return the modes that are wrong by a reading, or were of late.
 
-    `modes` are those of the baseline, in the order of the reading's; `before` is the same by the
-    test before.
+    `columns` are of the baseline's modes, as the reading is; `before` is the same by the test
+    before.
     """
     if reading.modes is None:
         return tuple(before)
     known = {(each.plane, each.order): each for each in before}
-    misfit = off_the_baseline(reading)
+    misfit = off_the_baseline(reading, columns)
     is_wrong = reading.modes.mistaken | misfit
     found = []
     for key, wrong, off, variance in zip(
-        modes, is_wrong.tolist(), misfit.tolist(), reading.modes.variances, strict=True
+        columns.modes, is_wrong.tolist(), misfit.tolist(), reading.modes.variances, strict=True
     ):
         run = known.get(key)
         if wrong:
@@ -151,7 +151,7 @@ def repeated_mistakes(
     return tuple(found)
 
 
-def off_the_baseline(reading: Reading) -> BoolArray:
+def off_the_baseline(reading: Reading, columns: Columns) -> BoolArray:
     """Return which modes (modes,) lie off the state that a reading fits best.
 
     None where these are few enough to be misnamed.
@@ -160,7 +160,7 @@ def off_the_baseline(reading: Reading) -> BoolArray:
     if modes is None:
         return np.zeros(0, bool)
     measured = np.isfinite(modes.variances)
-    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > LIMITS.notices_off)
+    off = measured & (np.abs(modes.values - columns.slopes @ reading.mean) > LIMITS.notices_off)
     can_tell = measured.sum() > len(reading.mean) + 1
     are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
     return off if are_too_many else np.zeros(len(off), bool)
