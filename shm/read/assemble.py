@@ -302,6 +302,8 @@ def _without_error_values(values: FloatArray) -> FloatArray:
         digits = f"{abs(worst):.9g}".replace(".", "")
         rest = values[(values != worst) & ~np.isnan(values)]
         is_nines = len(digits) > 2 and set(digits) == {"9"} and len(rest) > 0
+        if worst > 0 and np.sum(values == worst) == 1:
+            continue  # the force of one hit may be any number
         # A signal that is clipped there comes nearer to its limit than three times its range.
         if is_nines and np.abs(worst - rest).min() > 3 * np.ptp(rest):
             values = np.where(values == worst, NAN, values)

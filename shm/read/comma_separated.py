@@ -30,6 +30,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from functools import cache, partial
 from pathlib import Path
 
@@ -176,9 +177,6 @@ class _Text:
     def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
         """Return the header of the lines above the names, and remarks on unknown keys."""
         channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
-        for name, unit in self.units.items():
-            if unit and name in channels:
-                channels[name]["unit"] = Entry(unit, self.path, self.at + 1)
         keys = {f"{a}{dot}{b}": (n, k) for n in names for k in CHANNEL_KEYS for dot in "._ "
                 for a, b in ((n.lower(), k), (k, n.lower()))}  # fmt: skip
         entries: dict[str, Entry] = {}
@@ -203,6 +201,10 @@ class _Text:
                 _state(channels[name], channel_key, entry, name)
             else:
                 remarks.append(f"line {line}: {key!r} is not a key of recordings; left out.")
+        for name, unit in self.units.items():
+            stated = channels.get(name, {})
+            if unit and name in channels and not ("unit" in stated and "calibration" in stated):
+                _state(stated, "unit", Entry(unit, self.path, self.at + 1), name)
         return Header(self.path, channels, entries), tuple(remarks)
 
     def _body(self, start: int) -> list[tuple[int, str]]:
@@ -257,13 +259,27 @@ class _Text:
 def _state(entries: dict[str, Entry], key: str, entry: Entry, channel: str = "") -> None:
     """Add an entry; raises BadInput where an earlier line states another value of its key."""
     before = entries.get(key, entry)
-    if before.text and entry.text and plain_unit(before.text) != plain_unit(entry.text):
+    if before.text and entry.text and not _agree(before.text, entry.text):
         raise entry.refusal(
             f"{key} = {entry.text}, but line {before.line} states {before.text}.",
             "Remove the line that is wrong.",
             channel,
         )
     entries[key] = entry if entry.text else before
+
+
+def _agree(one: str, other: str) -> bool:
+    """Return True for the same unit, number or time, however it is written."""
+    if plain_unit(one) == plain_unit(other):
+        return True
+    (first, *unit), (second, *other_unit) = one.split(maxsplit=1), other.split(maxsplit=1)
+    numbers = _number(first), _number(second)
+    if None not in numbers:
+        return numbers[0] == numbers[1] and (unit == other_unit or not (unit and other_unit))
+    try:
+        return datetime.fromisoformat(one) == datetime.fromisoformat(other)
+    except ValueError:
+        return False
 
 
 def _is_remark(line: str) -> bool:

@@ -231,11 +231,8 @@ def _with_unit(key: str, value: str) -> tuple[str, str]:
 # ---------------------------------------------------------------- what the facts say
 
 
-def stated_rate(facts: Sequence[tuple[str, str]], decimal: str, path: Path) -> float:
-    """Return the sampling rate of a preamble in Hz; NaN where it gives none.
-
-    Raises BadInput where lines state two that no rounded step explains.
-    """
+def _stated_rates(facts: Sequence[tuple[str, str]], decimal: str) -> dict[float, str]:
+    """Return the sampling rates (Hz) that lines of a preamble state, each with its line."""
     stated: dict[float, str] = {}
     for key, value in facts:
         number, unit = leading_quantity(value, decimal)
@@ -247,13 +244,23 @@ def stated_rate(facts: Sequence[tuple[str, str]], decimal: str, path: Path) -> f
             stated.setdefault(number * (1e3 if hertz[1] else 1.0), f"{key}: {value}")
         elif words.means_interval(key) and seconds:
             stated.setdefault(1 / (number * seconds), f"{key}: {value}")
+    return stated
+
+
+def refuse_several_rates(facts: Sequence[tuple[str, str]], decimal: str, path: Path) -> None:
+    """Raise BadInput where lines of a preamble state two rates that no rounded step explains."""
+    stated = _stated_rates(facts, decimal)
     if stated and max(stated) > 1.05 * min(stated):
         raise BadInput(
             f"its heading states several sampling rates: {'; '.join(stated.values())}.",
             file=path,
             remedy="Remove the lines that are wrong.",
         )
-    if stated:
+
+
+def stated_rate(facts: Sequence[tuple[str, str]], decimal: str) -> float:
+    """Return the sampling rate of a preamble in Hz; NaN where it gives none."""
+    if stated := _stated_rates(facts, decimal):
         return next(iter(stated))
     for key, value in facts:
         found = _RATE_IN_WORDS.search(f"{key} {value}")

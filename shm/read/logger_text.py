@@ -31,6 +31,7 @@ from shm.read.logger_heading import (
     distinct_names,
     heading_of,
     leading_quantity,
+    refuse_several_rates,
     stated_rate,
     unrounded,
     with_channel_units,
@@ -115,9 +116,11 @@ def _parsed(
 def _table(heading: Heading, block: DataRows, path: Path, before: int = 0) -> Table:
     """Return the table of a heading of which `before` lines are not in the file."""
     decimal = block.dialect.decimal
-    rate = stated_rate(heading.facts, decimal, path)
+    rate = stated_rate(heading.facts, decimal)
     order = day_order_of(_days(heading), block)
     clock = clock_of(heading, block, rate, order, path)
+    if clock.seconds is None:
+        refuse_several_rates(heading.facts, decimal, path)
     time, is_local = clock.start, clock.is_local
     if time is None:
         time, is_local = _time(heading, order)

@@ -229,7 +229,7 @@ def means_force_alone(name: str) -> bool:
 
 def means_no_axis(name: str) -> bool:
     """Return whether a name is that of the size of an acceleration, whose sign is lost."""
-    return _SIZE.search(name) is not None
+    return _SIZE.search(name) is not None and re.search(r"\b[xyz]\b", name, re.IGNORECASE) is None
 
 
 def plane_meant(name: str) -> Plane | None:

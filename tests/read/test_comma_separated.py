@@ -71,6 +71,9 @@ def test_a_file_as_described_is_read(tmp_path: Path) -> None:
         lambda text: text + "\x1a",
         lambda text: text.replace("# ", "#"),
         lambda text: text.replace("# hanger", "# Hanger"),
+        lambda text: "# Hanger: 03\n" + text,
+        lambda text: "# sampling_rate_hz: 512.0 Hz\n" + text,
+        lambda text: "# time: 2026-05-01T10:00:00Z\n" + text,
         lambda text: text.replace("m/s2", "m/s²").encode("latin-1"),
         lambda text: text.replace("m/s2", "m/s^2"),
         lambda text: text.replace("m/s2", "[m/s²]"),
@@ -188,7 +191,7 @@ WHOLE = f"{HEAD}{NAMES}\n{ROWS}"
         (f"# acc_2.unit: g\n{WHOLE}", "test.csv, line 7, channel acc_2", "but line 1 states g"),
         (
             WHOLE.replace(NAMES, "force,acc_1,acc_2 [g]"),
-            "test.csv, line 6, channel acc_2", "unit = m/s2, but line 8 states g",
+            "test.csv, line 8, channel acc_2", "unit = g, but line 6 states m/s2",
         ),
         (WHOLE.replace(NAMES, "force,,acc_2"), "test.csv, line 8", "no name"),
         (WHOLE.replace(NAMES + "\n", ""), "test.csv, line 8", "names of the columns are missing"),
@@ -207,6 +210,12 @@ def test_a_fault_is_refused_with_its_place_and_a_remedy(
         recorded(tmp_path, text)
     assert refusal.value.where == where
     assert refusal.value.remedy
+
+
+def test_volts_of_a_calibrated_channel_are_no_other_unit(tmp_path: Path) -> None:
+    names = ",".join(f"{name} [V]" for name in NAMES.split(","))
+    found = recorded(tmp_path, f"{HEAD}# calibration: 2, 1, 1\n{names}\n{ROWS}")
+    np.testing.assert_array_equal(found.channels[0].values, 2 * np.arange(20.0))
 
 
 @pytest.mark.parametrize("time", ["Time [ms]", "time (ms)"])

@@ -185,3 +185,24 @@ def test_the_size_of_an_acceleration_is_no_channel(tmp_path: Path) -> None:
     found = peek(path)
     assert [channel.name for channel in found.channels] == ["Acceleration x"]
     assert found.left_out == ("Absolute acceleration (no axis)",)
+
+
+def test_two_rates_are_refused_unless_times_decide(tmp_path: Path) -> None:
+    """As of groups of channels, of which a slow one holds temperatures."""
+    heading = "[Group 1]\nSampling rate = 500 Hz\n[Group 2]\nSampling rate = 10 Hz\n"
+    rows = "".join(f"{0.002 * i:.3f},{i % 7},{i % 5}\n" for i in range(200))
+    path = tmp_path / "groups.txt"
+    path.write_text(f"{heading}Time (s),Force (N),Acc X (m/s2)\n{rows}")
+    assert recorded(path).sampling_rate_hz == pytest.approx(500)
+    untimed = "".join(f"{i % 7},{i % 5}\n" for i in range(200))
+    path.write_text(f"{heading}Force (N),Acc X (m/s2)\n{untimed}")
+    refused(path, "several sampling rates")
+
+
+def test_a_single_force_of_nines_is_a_hit(tmp_path: Path) -> None:
+    rows = "".join(f"{0.002 * i:.3f},{999 if i == 90 else i % 2},{i % 5}\n" for i in range(200))
+    path = tmp_path / "hit.txt"
+    path.write_text(f"Time (s),Force (N),Absolute acceleration X (m/s2)\n{rows}")
+    force, motion = recorded(path).channels
+    assert force.values[90] == 999
+    assert motion.name == "Absolute acceleration X"
