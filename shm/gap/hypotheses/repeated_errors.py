@@ -230,14 +230,14 @@ class ShapeScaling:
         x_m = np.array(design.places_m)[design.shape_place]
         sine = np.sin(design.frequency_order[mode] * np.pi * x_m / length_m)
         reference = np.where(design.frequency_plane[mode] == axis, sine, 0.0)
-        return cls(_counted(design), np.ones(len(mode)), reference, quarter_turn(design), mode < 0)
+        none = np.zeros(len(mode), dtype=bool)
+        return cls(_counted(design), np.ones(len(mode)), reference, quarter_turn(design), none)
 
     def scaled(self, raw: FloatArray) -> FloatArray:
-        """Shapes (n, S) of any scale, scaled; those that turn, turned to the reference.
+        """Return shapes (n, S) scaled; those that turn also in the reference's direction.
 
-        From these the way that they were turned is taken back, as an arc: what is then left of a
-        measured one is its turn from the plane, however large, times what a small turn does to it
-        (`turn_loads`).
+        From these the turn is subtracted as an arc. So what is left of a measured shape is its
+        angle to the plane, however large, times what a small turn adds to it (`turn_loads`).
         """
         if raw.shape[1] == 0:
             return raw
